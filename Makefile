@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# libhm2: one Makefile for everything. `make help` lists the targets. Works without ./configure, with defaults.
+
+BUILDDIR ?= build
+-include config.mk
+
+VERSION := 0.1.0
+SOVERSION := 0
+
+prefix ?= /usr/local
+exec_prefix ?= $(prefix)
+bindir ?= $(exec_prefix)/bin
+libdir ?= $(exec_prefix)/lib
+includedir ?= $(prefix)/include
+mandir ?= $(prefix)/share/man
+datadir ?= $(prefix)/share
+INSTALL ?= install
+
+CC ?= cc
+AR ?= ar
+CFLAGS ?= -O2 -g
+PKG_CONFIG ?= pkg-config
+FUZZ_CC ?= clang
+FUZZ_SECONDS ?= 20
+
+# Our own builds treat warnings as errors; a release must build with next year's compiler: make WERROR=
+WERROR ?= -Werror
+WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wvla -Wswitch-enum -Wmissing-prototypes \
+	-Wstrict-prototypes -Wcast-qual -Wwrite-strings -Wundef $(WERROR)
+ALL_CFLAGS = -std=c11 -D_GNU_SOURCE -fPIC -fvisibility=hidden -ffp-contract=off $(WARNINGS) $(CPPFLAGS) $(CFLAGS) \
+	$(SANITIZE)
+ALL_CPPFLAGS := -Ilib/include
+DEPFLAGS = -MMD -MP
+SRCDIR := $(patsubst %/,%,$(dir $(abspath $(lastword $(MAKEFILE_LIST)))))
+
+V ?= 0
+ifeq ($(V),0)
+say = @printf '  %-8s %s\n' $(1) '$(2)';
+else
+say =
+endif
+
+# ---- sources: a new file in its folder is part of the build -----------------------------------------------------
+
+LIB_DIRS := core link lbp16 hostmot2 module board
+LIB_SRC := $(sort $(foreach d,$(LIB_DIRS),$(wildcard lib/$(d)/*.c)))
+SIM_SRC := $(sort $(wildcard lib/sim/*.c))
+HOST_SRC := $(sort $(wildcard lib/halhost/*.c))
+TOOLS := $(sort $(notdir $(patsubst %/,%,$(dir $(wildcard tools/*/main.c)))))
+COMPONENTS := $(sort $(notdir $(patsubst %/,%,$(dir $(wildcard components/*/main.c)))))
+UNIT_TESTS := $(sort $(patsubst tests/unit/%.c,%,$(wildcard tests/unit/test_*.c)))
+SYSTEM_TESTS := $(sort $(patsubst tests/system/%.c,%,$(wildcard tests/system/check_*.c)))
+FUZZERS := $(sort $(patsubst tests/fuzz/%.c,%,$(wildcard tests/fuzz/fuzz_*.c)))
+BENCHES := $(sort $(patsubst tests/bench/%.c,%,$(wildcard tests/bench/bench_*.c)))
+UNIT_HELPERS := $(sort $(filter-out tests/unit/test_%.c,$(wildcard tests/unit/*.c)))
+SYSTEM_HELPERS := $(sort $(filter-out tests/system/check_%.c,$(wildcard tests/system/*.c)))
+MAN_PAGES := $(sort $(wildcard man/*.[0-9]))
+
+obj = $(patsubst %.c,$(BUILDDIR)/obj/%.o,$(1))
+LIB_OBJ := $(call obj,$(LIB_SRC))
+SIM_OBJ := $(call obj,$(SIM_SRC))
+HOST_OBJ := $(call obj,$(HOST_SRC))
+
+LIB_A := $(BUILDDIR)/libhm2.a
+LIB_SO := $(BUILDDIR)/libhm2.so.$(SOVERSION)
+SIM_A := $(BUILDDIR)/libhm2sim.a
+HOST_A := $(BUILDDIR)/libhalhost.a
+PROGRAMS := $(addprefix $(BUILDDIR)/,$(TOOLS))
+COMPONENT_SO := $(patsubst %,$(BUILDDIR)/components/%.so,$(COMPONENTS))
+UNIT_BIN := $(addprefix $(BUILDDIR)/unit/,$(UNIT_TESTS))
+SYSTEM_BIN := $(addprefix $(BUILDDIR)/system/,$(SYSTEM_TESTS))
+FUZZ_BIN := $(addprefix $(BUILDDIR)/fuzz/,$(FUZZERS))
+BENCH_BIN := $(addprefix $(BUILDDIR)/bench/,$(BENCHES))
+
+.PHONY: all help check check-unit check-system bench fuzz lint install uninstall dist clean format
+.DEFAULT_GOAL := all
+.SECONDARY:
+.DELETE_ON_ERROR:
+
+all: $(LIB_A) $(LIB_SO) $(SIM_A) $(PROGRAMS) $(COMPONENT_SO) $(BUILDDIR)/libhm2.pc ## build libraries, programs, components
+
+help: ## this list
+	@echo 'make [TARGET] [BUILDDIR=build] [CC=gcc] [SANITIZE=-fsanitize=address,undefined] [V=1]'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1\t\2/p' Makefile | expand -t 18
+
+# ---- libraries ----------------------------------------------------------------------------------------------------
+
+$(BUILDDIR)/obj/lib/sim/%.o: EXTRA_CPPFLAGS := -Ilib/sim
+$(BUILDDIR)/obj/lib/halhost/%.o: EXTRA_CPPFLAGS := -Ilib/halhost -Ilib/halhost/include
+$(BUILDDIR)/obj/components/%.o: EXTRA_CPPFLAGS := -Icomponents -Ilib/halhost/include -DRTAPI -D__MODULE__
+$(BUILDDIR)/obj/tools/%.o: EXTRA_CPPFLAGS := -Ilib/halhost -Ilib/halhost/include -DHM2_VERSION='"$(VERSION)"' \
+	-DHM2_SOURCE_DIR='"$(SRCDIR)"' $(EDIT_CFLAGS)
+$(BUILDDIR)/obj/tests/%.o: EXTRA_CPPFLAGS := -Ilib/sim -Ilib/halhost -Ilib/halhost/include -Ilib/board -Ilib/module \
+	-Ilib/hostmot2 -DTEST_DATA='"$(SRCDIR)/tests/data"' -DTEST_BUILD='"$(abspath $(BUILDDIR))"' \
+	-DTEST_SOURCE='"$(SRCDIR)"'
+
+$(BUILDDIR)/obj/%.o: %.c
+	@mkdir -p $(@D)
+	$(call say,CC,$<)$(CC) $(ALL_CPPFLAGS) $(EXTRA_CPPFLAGS) $(ALL_CFLAGS) $(DEPFLAGS) -c -o $@ $<
+
+$(LIB_A): $(LIB_OBJ)
+$(SIM_A): $(SIM_OBJ)
+$(HOST_A): $(HOST_OBJ)
+%.a:
+	$(call say,AR,$@)rm -f $@ && $(AR) rcs $@ $^
+
+$(LIB_SO): $(LIB_OBJ) lib/libhm2.map
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -shared -Wl,-soname,libhm2.so.$(SOVERSION) \
+		-Wl,--version-script,lib/libhm2.map -Wl,-z,defs -o $@ $(LIB_OBJ) -lm -lpthread
+	@ln -sf $(@F) $(BUILDDIR)/libhm2.so
+
+$(BUILDDIR)/libhm2.pc: lib/libhm2.pc.in Makefile
+	@mkdir -p $(@D)
+	$(call say,GEN,$@)sed -e 's|@prefix@|$(prefix)|' -e 's|@libdir@|$(libdir)|' -e 's|@includedir@|$(includedir)|' \
+		-e 's|@version@|$(VERSION)|' $< > $@
+
+# ---- programs and components --------------------------------------------------------------------------------------
+
+EDIT_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libedit 2>/dev/null)
+EDIT_LIBS ?= $(shell $(PKG_CONFIG) --libs libedit 2>/dev/null)
+
+define tool_rule
+$(BUILDDIR)/$(1): $(call obj,$(wildcard tools/$(1)/*.c)) $$(if $$(filter hm2host,$(1)),$(HOST_A)) $(SIM_A) $(LIB_A)
+	@mkdir -p $$(@D)
+	$$(call say,LD,$$@)$$(CC) $$(ALL_CFLAGS) $$(LDFLAGS) -o $$@ $$(filter %.o,$$^) $$(TOOL_LIBS) -lm -lpthread
+endef
+$(foreach t,$(TOOLS),$(eval $(call tool_rule,$(t))))
+$(BUILDDIR)/%: TOOL_LIBS = $(SIM_A) $(LIB_A)
+# The host exports its HAL and RTAPI calls to the modules it loads, so every object of it must be linked in.
+$(BUILDDIR)/hm2host: TOOL_LIBS = -Wl,--whole-archive $(HOST_A) -Wl,--no-whole-archive $(LIB_A) -rdynamic -ldl $(EDIT_LIBS)
+
+define component_rule
+$(BUILDDIR)/components/$(1).so: $(call obj,$(wildcard components/$(1)/*.c)) $(LIB_A)
+	@mkdir -p $$(@D)
+	$$(call say,LD,$$@)$$(CC) $$(ALL_CFLAGS) $$(LDFLAGS) -shared -Wl,--exclude-libs,ALL -o $$@ $$(filter %.o,$$^) \
+		$(LIB_A) -lm -lpthread
+endef
+$(foreach c,$(COMPONENTS),$(eval $(call component_rule,$(c))))
+
+# ---- tests --------------------------------------------------------------------------------------------------------
+
+CMOCKA_LIBS ?= -lcmocka
+CHECK_LIBS ?= $(shell $(PKG_CONFIG) --libs check 2>/dev/null || echo -lcheck)
+
+$(BUILDDIR)/unit/%: $(BUILDDIR)/obj/tests/unit/%.o $(call obj,$(UNIT_HELPERS)) $(SIM_A) $(LIB_A) $(HOST_A)
+	@mkdir -p $(@D)
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(HOST_A) $(LIB_A) \
+		$(CMOCKA_LIBS) -lm -lpthread -ldl
+
+$(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPERS)) $(SIM_A) $(LIB_A)
+	@mkdir -p $(@D)
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(LIB_A) $(CHECK_LIBS) -lm \
+		-lpthread
+
+$(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(SIM_A) $(LIB_A)
+	@mkdir -p $(@D)
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(LIB_A) -lm -lpthread -ldl
+
+check: check-unit check-system ## run all tests; ends with "N passed, N failed, N skipped"
+	@scripts/run-tests --summary $(BUILDDIR)
+
+check-unit: $(UNIT_BIN) all
+	@scripts/run-tests $(BUILDDIR) unit $(UNIT_BIN)
+
+check-system: all $(SYSTEM_BIN)
+	@scripts/run-tests $(BUILDDIR) system $(SYSTEM_BIN)
+
+bench: all $(BENCH_BIN) ## compare with the peers, as ratios, in one run
+	@tests/bench/run $(BUILDDIR)
+
+fuzz: ## run every fuzz harness for FUZZ_SECONDS
+	@$(MAKE) --no-print-directory BUILDDIR=$(BUILDDIR)/fuzz-objects CC=$(FUZZ_CC) \
+		SANITIZE='-fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all' FUZZING=1 fuzz-binaries
+	@scripts/run-fuzz $(BUILDDIR)/fuzz-objects/fuzz $(FUZZ_SECONDS)
+
+.PHONY: fuzz-binaries
+fuzz-binaries: $(FUZZ_BIN)
+$(BUILDDIR)/fuzz/%: $(BUILDDIR)/obj/tests/fuzz/%.o $(SIM_A) $(HOST_A) $(LIB_A)
+	@mkdir -p $(@D)
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -fsanitize=fuzzer -o $@ $< $(SIM_A) $(HOST_A) $(LIB_A) -lm \
+		-lpthread -ldl
+
+lint: ## formatting, clang-tidy, cppcheck, man pages, shell, exported symbols
+	@scripts/lint $(BUILDDIR)
+
+format: ## rewrite sources in the house format
+	clang-format -i $$(git ls-files '*.c' '*.h')
+
+# ---- installation -------------------------------------------------------------------------------------------------
+
+install: all ## install below DESTDIR/prefix
+	$(INSTALL) -d $(DESTDIR)$(bindir) $(DESTDIR)$(libdir)/pkgconfig $(DESTDIR)$(libdir)/hm2/components \
+		$(DESTDIR)$(includedir)/hm2
+	$(INSTALL) -m 755 $(PROGRAMS) $(DESTDIR)$(bindir)
+	$(INSTALL) -m 644 $(LIB_A) $(SIM_A) $(DESTDIR)$(libdir)
+	$(INSTALL) -m 755 $(LIB_SO) $(DESTDIR)$(libdir)
+	ln -sf libhm2.so.$(SOVERSION) $(DESTDIR)$(libdir)/libhm2.so
+	$(INSTALL) -m 644 $(BUILDDIR)/libhm2.pc $(DESTDIR)$(libdir)/pkgconfig
+	$(INSTALL) -m 644 lib/include/hm2/*.h $(DESTDIR)$(includedir)/hm2
+	$(INSTALL) -m 755 $(COMPONENT_SO) $(DESTDIR)$(libdir)/hm2/components
+	for page in $(MAN_PAGES); do s=$${page##*.}; $(INSTALL) -d $(DESTDIR)$(mandir)/man$$s && \
+		$(INSTALL) -m 644 $$page $(DESTDIR)$(mandir)/man$$s || exit 1; done
+
+uninstall: ## remove what install put there
+	rm -f $(addprefix $(DESTDIR)$(bindir)/,$(TOOLS)) $(DESTDIR)$(libdir)/libhm2.a $(DESTDIR)$(libdir)/libhm2sim.a \
+		$(DESTDIR)$(libdir)/libhm2.so $(DESTDIR)$(libdir)/libhm2.so.$(SOVERSION) \
+		$(DESTDIR)$(libdir)/pkgconfig/libhm2.pc
+	rm -rf $(DESTDIR)$(includedir)/hm2 $(DESTDIR)$(libdir)/hm2
+	for page in $(MAN_PAGES); do rm -f $(DESTDIR)$(mandir)/man$${page##*.}/$${page##*/}; done
+
+dist: ## source archive of the committed tree
+	@mkdir -p $(BUILDDIR)
+	git archive --prefix=libhm2-$(VERSION)/ -o $(BUILDDIR)/libhm2-$(VERSION).tar.gz HEAD
+
+clean: ## remove the build folder
+	rm -rf $(BUILDDIR)
+
+-include $(patsubst %.o,%.d,$(LIB_OBJ) $(SIM_OBJ) $(HOST_OBJ) \
+	$(call obj,$(wildcard tools/*/*.c components/*/*.c tests/*/*.c)))

@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A card as a whole: identify it, set its modules up, run its cycle, survive what the network and the mains do to it.
+ *
+ * Set-up (identify, setup, start) and stop() talk to the card and wait; call them outside realtime. request(), read()
+ * and write() are the cycle: realtime safe, one send each for request and write, and the receives for the reply.
+ * One thread at a time per board; different boards are independent.
+ *
+ * A cycle's inputs are applied whole or not at all. Semantics of the packet-error points, io_error and has_bit are
+ * LinuxCNC's (hal-interface 3.4, 3.5) with the verdicts of its section 8.
+ */
+#ifndef HM2_BOARD_H
+#define HM2_BOARD_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hm2/config.h>
+#include <hm2/err.h>
+#include <hm2/idrom.h>
+#include <hm2/link.h>
+#include <hm2/points.h>
+
+/* What a card's name tells (hal-interface 1.3). */
+struct hm2_board_type {
+    const char *name;              /* compared with the 16 characters of LBP16 space 7 */
+    unsigned compared;             /* characters compared, terminating zeros included */
+    const char *stem;              /* HAL name: "7i96s" */
+    unsigned io_ports, port_width; /* 0 = unknown card: from the IDROM */
+    const char *connectors[4];
+    unsigned leds;
+    const char *const *terminals; /* one name per I/O, or NULL: connector and pin number are printed */
+};
+
+#define HM2_BOARD_NAME_BYTES 16u
+
+/* Row for a card name (longest match first); for an unknown card the catch-all row, never NULL. */
+HM2_API const struct hm2_board_type *hm2_board_type_find(const char name[HM2_BOARD_NAME_BYTES]);
+/* The table, for listings and tests. */
+HM2_API const struct hm2_board_type *hm2_board_type_at(size_t index);
+
+struct hm2_board;
+
+/* Allocates a board (the only allocation; everything a cycle needs is inside or comes from the binder). */
+HM2_API struct hm2_board *hm2_board_new(void);
+/* Does not stop the card: see hm2_board_stop(). Closes the link. */
+HM2_API void hm2_board_free(struct hm2_board *board);
+
+/* Take the link over, read the card's name, cookie and IDROM, and check them. Retries lost packets; gives up after
+ * about one second. Afterwards the getters below work. */
+HM2_API int HM2_MUST_CHECK hm2_board_identify(struct hm2_board *board, struct link *link, struct hm2_diag *diag);
+HM2_API const struct hm2_board_type *hm2_board_type(const struct hm2_board *board);
+HM2_API const struct hm2_idrom *hm2_board_idrom(const struct hm2_board *board);
+HM2_API const char *hm2_board_card_name(const struct hm2_board *board);
+HM2_API const char *hm2_board_prefix(const struct hm2_board *board); /* "hm2_7i96s.0", after setup */
+
+/* Create every module and point of the card. index is the number of this card among cards of the same stem. */
+HM2_API int HM2_MUST_CHECK hm2_board_setup(struct hm2_board *board, unsigned index, struct hm2_binder *binder,
+                                           const char *config, struct hm2_diag *diag);
+/* Bring the card into its defined idle state (outputs inactive), read it once and take its counters as the start. */
+HM2_API int HM2_MUST_CHECK hm2_board_start(struct hm2_board *board, struct hm2_diag *diag);
+/* Make the watchdog bite, so that every output goes to its safe state. Best effort, also after a failed set-up. */
+HM2_API void hm2_board_stop(struct hm2_board *board);
+
+/* The cycle. period_ns is the thread's. */
+HM2_API void hm2_board_request(struct hm2_board *board, int64_t period_ns);
+/* Sends the request first when none is outstanding. */
+HM2_API void hm2_board_read(struct hm2_board *board, int64_t period_ns);
+HM2_API void hm2_board_write(struct hm2_board *board, int64_t period_ns);
+HM2_API bool hm2_board_request_outstanding(const struct hm2_board *board);
+
+/* What happened, for people. Not realtime; may run in another thread than the cycle. Returns 1 with one sentence in
+ * text and its severity in *error (true = an operator must know), 0 when there is nothing new. */
+HM2_API int hm2_board_next_message(struct hm2_board *board, char *text, size_t size, bool *error);
+
+/* Listing of pins by terminal name and owner, one line a pin, as printed at load. Returns characters needed. */
+HM2_API size_t hm2_board_describe_pins(const struct hm2_board *board, char *text, size_t size);
+
+#endif

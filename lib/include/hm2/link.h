@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * How datagrams reach a device and come back.
+ *
+ * A link moves whole datagrams. It owns the clock in which deadlines are expressed, so the same state machine runs
+ * against a socket (CLOCK_MONOTONIC) and against the mock or the simulated card (virtual time). send() and recv() of
+ * an open link are realtime safe: no allocation, no lock, no system call but those that move the datagram.
+ * A link is used by one thread at a time.
+ */
+#ifndef HM2_LINK_H
+#define HM2_LINK_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hm2/err.h>
+
+/* Largest UDP payload without fragmentation on Ethernet: 1500 - 20 (IPv4) - 8 (UDP); the cards do not fragment
+ * (seed 000, "HOST COMMUNICATION"). */
+#define LINK_MAX_DATAGRAM_BYTES 1472u
+
+struct link;
+
+struct link_ops {
+    /* Send one datagram. 0, HM2_ERR_IO, HM2_ERR_NOSPACE (longer than LINK_MAX_DATAGRAM_BYTES). */
+    int (*send)(struct link *link, const void *data, size_t len);
+    /* Receive one datagram that comes from the device. Returns its length (0..cap), HM2_ERR_TIMEOUT when none came
+     * before deadline_ns, HM2_ERR_IO, HM2_ERR_NOSPACE when it was longer than cap (it is consumed). A deadline in
+     * the past returns what is queued already. */
+    int (*recv)(struct link *link, void *data, size_t cap, int64_t deadline_ns);
+    int64_t (*now_ns)(struct link *link);
+    void (*close)(struct link *link); /* releases everything, the link itself included */
+};
+
+/* What a link counts by itself. Written by the link's thread (strangers: by its owner), read by anyone. */
+struct link_counters {
+    uint64_t sent, received;
+    uint64_t send_errors;
+    uint64_t receive_errors;
+    uint64_t strangers; /* datagrams for our port that came from somebody else than the device */
+};
+
+struct link {
+    const struct link_ops *ops;
+    struct link_counters counters;
+};
+
+static inline int HM2_MUST_CHECK link_send(struct link *const link, const void *const data, const size_t len)
+{
+    return link->ops->send(link, data, len);
+}
+
+static inline int HM2_MUST_CHECK link_recv(struct link *const link, void *const data, const size_t cap,
+                                           const int64_t deadline_ns)
+{
+    return link->ops->recv(link, data, cap, deadline_ns);
+}
+
+static inline int64_t link_now_ns(struct link *const link)
+{
+    return link->ops->now_ns(link);
+}
+
+static inline void link_close(struct link *const link)
+{
+    if (link)
+        link->ops->close(link);
+}
+
+/* ---- UDP ------------------------------------------------------------------------------------------------------- */
+
+struct link_udp_options {
+    const char *address;   /* dotted IPv4 of the card, optionally ":port" (default LBP16's 27181) */
+    unsigned busy_poll_us; /* SO_BUSY_POLL; 0 = off */
+    bool watch_strangers;  /* count datagrams from others, in a thread that never touches the cyclic socket */
+};
+
+/* Open a connected socket: packets of strangers never reach recv(). Not realtime safe. On failure diag says why. */
+HM2_API int HM2_MUST_CHECK link_udp_open(struct link **link, const struct link_udp_options *options,
+                                         struct hm2_diag *diag);
+
+/* ---- mock: scripted exchanges in virtual time ------------------------------------------------------------------ */
+
+/* One reply that a mock gives. delay_ns counts from the send that it answers. */
+struct link_mock_reply {
+    const void *data;
+    size_t len;
+    int64_t delay_ns;
+};
+
+/* Called for every datagram sent; queues any number of replies with link_mock_push(). Returns 0 or the error that
+ * send() shall return. */
+typedef int (*link_mock_handler)(void *context, struct link *mock, const uint8_t *data, size_t len);
+
+HM2_API int HM2_MUST_CHECK link_mock_open(struct link **link, link_mock_handler handler, void *context);
+HM2_API int HM2_MUST_CHECK link_mock_push(struct link *mock, const struct link_mock_reply *reply);
+HM2_API void link_mock_advance(struct link *mock, int64_t by_ns); /* virtual time passes */
+
+/* A scripted mock: expects exactly these datagrams in this order. Text, one item a line: "> hex" is expected from
+ * the client, "< hex" is the reply, "! lose" drops the next reply, "! dup" sends it twice, "! delay NS", "! cut N"
+ * shortens it to N bytes, "! garble N" flips a bit of byte N, "! senderr" makes the next send fail. "#" comments. */
+HM2_API int HM2_MUST_CHECK link_mock_script(struct link **link, const char *script, struct hm2_diag *diag);
+/* 0 when the script was followed to its end; otherwise diag tells line, expected and found. */
+HM2_API int link_mock_finish(struct link *mock, struct hm2_diag *diag);
+
+/* ---- record and replay ----------------------------------------------------------------------------------------- */
+
+/* Wrap a link: every datagram is written, with time and direction, to a text file (format: man page hm2capture(5)).
+ * Writing happens in the calling thread: for diagnosis, not for production. Closing closes the inner link too. */
+HM2_API int HM2_MUST_CHECK link_record_open(struct link **link, struct link *inner, const char *path,
+                                            struct hm2_diag *diag);
+/* Answer from a capture file, in virtual time; a request that differs from the recorded one is HM2_ERR_MISMATCH. */
+HM2_API int HM2_MUST_CHECK link_replay_open(struct link **link, const char *path, struct hm2_diag *diag);
+
+#endif

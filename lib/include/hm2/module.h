@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * What a HostMot2 module driver is: one file in lib/module, one row in the registry.
+ *
+ * A module type checks its descriptor, claims its pins, binds its points and adds its registers to the transfer plan
+ * in setup(); afterwards unpack() turns received registers into pin values and pack() turns pin values into
+ * registers. unpack() and pack() are realtime safe: no allocation, lock, formatting or system call; they never divide
+ * by a pin without a guard and never let a NaN or an out-of-range value reach a register.
+ */
+#ifndef HM2_MODULE_H
+#define HM2_MODULE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hm2/config.h>
+#include <hm2/err.h>
+#include <hm2/idrom.h>
+#include <hm2/plan.h>
+#include <hm2/points.h>
+
+/* Facts of the present cycle, the same for every module of a card. */
+struct hm2_cycle {
+    int64_t now_ns;    /* link's clock, when the request was sent (unpack) or the write is packed (pack) */
+    int64_t period_ns; /* of the thread, > 0 */
+    double period_s;
+    uint32_t writes; /* write cycles since load or since the last restart; 0 = this is the first */
+    bool bitten;     /* the card's watchdog has bitten and was not yet cleared: outputs are off */
+};
+
+/* Conditions a module meets in a cycle that a person should hear about. The board turns them into messages outside
+ * the realtime path (or through the host's queued print), each at most once until it ends. */
+enum hm2_notice {
+    HM2_NOTICE_WATCHDOG_BIT,  /* a: 0 */
+    HM2_NOTICE_VALUE_CLAMPED, /* a point was out of range and was rewritten */
+    HM2_NOTICE_VALUE_INVALID, /* a point was NaN or impossible; a safe value is used */
+    HM2_NOTICE_QUAD_ERROR,
+    HM2_NOTICE_TIMEOUT_SHORT,  /* watchdog time-out below 1.5 periods */
+    HM2_NOTICE_TABLE_TOO_LONG, /* step table longer than 16 or wider than the pins */
+    HM2_NOTICE_HEADROOM,       /* command needs more than maxvel/maxaccel allow */
+    HM2_NOTICES
+};
+
+struct hm2_board;
+struct hm2_module;
+
+/* Owner of an I/O pin, one per pin descriptor. */
+struct hm2_pin {
+    struct hm2_pd pd;
+    const struct hm2_module *owner; /* NULL = GPIO */
+    bool immediate;                 /* owner's output is driven from load on, not from the first write on */
+};
+
+struct hm2_setup {
+    const struct hm2_idrom *idrom;
+    const struct hm2_config *config;
+    struct hm2_plan *plan;
+    struct hm2_binder *binder;
+    struct hm2_pin *pins; /* idrom->pin_count */
+    struct hm2_diag *diag;
+    const char *prefix;  /* "hm2_7i96s.0" */
+    unsigned board_leds; /* from the board table */
+    bool has_dpll;       /* the firmware contains an HM2DPLL, whether used or not */
+    void *access;        /* for peek and poke */
+    /* One confirmed register access at load time. 0 or the link's error. Undriven registers read 0 or all ones. */
+    int (*peek)(struct hm2_setup *setup, uint16_t address, unsigned words, uint32_t *values);
+    int (*poke)(struct hm2_setup *setup, uint16_t address, unsigned words, const uint32_t *values);
+};
+
+/* Accepted descriptor (hal-interface 1.5). */
+struct hm2_md_variant {
+    uint8_t version, registers;
+    uint32_t instance_stride, multiple;
+};
+
+struct hm2_module_type {
+    const char *name; /* HAL name part: "stepgen" */
+    uint8_t gtag;
+    const struct hm2_md_variant *variants;
+    size_t variant_count; /* 0 = any */
+    int config_count;     /* enum hm2_config_count or -1 when the number cannot be configured */
+    bool clamp_count;     /* a configured number above the firmware's is clamped with a warning */
+    /* Claim pins, bind points, add registers; sets module->context (memory from the binder). module->instances is
+     * already the number to use; 0 = present but not used (setup is called all the same). */
+    int (*setup)(struct hm2_module *module, struct hm2_setup *setup);
+    /* The first reply after load, or after the card came back from a power cycle, is in the windows: take present
+     * counter values as the start, so that positions neither jump nor lose what they had. May be NULL. */
+    void (*start)(struct hm2_module *module, const struct hm2_cycle *cycle);
+    void (*unpack)(struct hm2_module *module, const struct hm2_cycle *cycle); /* may be NULL */
+    void (*pack)(struct hm2_module *module, const struct hm2_cycle *cycle);   /* may be NULL */
+    /* After the reply was judged fresh but before unpack, a write had been lost: modules with self-clearing bits
+     * learn here that what they sent did not arrive. Most need nothing (sections are resent). May be NULL. */
+    void (*write_lost)(struct hm2_module *module);
+    /* Tables of the points, for documentation and tests; NULL-terminated list of {prefix pattern, rows, count}. */
+    const struct hm2_point_group *groups;
+};
+
+/* A documented table of points: prefix "stepgen.##" means one set per instance. */
+struct hm2_point_group {
+    const char *prefix;
+    const struct hm2_point *points;
+    size_t count;
+    const char *condition; /* when these exist, NULL = always */
+};
+
+struct hm2_module {
+    const struct hm2_module_type *type;
+    const struct hm2_md *md;
+    struct hm2_board *board; /* for hm2_notice() */
+    unsigned instances;      /* in use */
+    void *context;
+    const char *prefix; /* of the board */
+};
+
+/* Report a condition from a cycle: counts it and keeps the first occurrence for the board's message queue.
+ * instance and value go into the message. Realtime safe. */
+HM2_API void hm2_notice(const struct hm2_module *module, enum hm2_notice notice, unsigned instance, double value);
+
+/* Claim every pin whose secondary tag is the module's (or gtag) and whose unit is below units or global. filter may
+ * be NULL; it may refuse single pins. Already claimed pins are a violation reported in diag. */
+HM2_API int HM2_MUST_CHECK hm2_claim_pins(const struct hm2_module *module, struct hm2_setup *setup, uint8_t gtag,
+                                          unsigned units, bool immediate,
+                                          bool (*filter)(const struct hm2_pd *pd, const struct hm2_setup *setup));
+
+/* Every module type this library knows, in the order in which they are unpacked and packed; NULL-terminated. */
+HM2_API extern const struct hm2_module_type *const hm2_module_types[];
+
+/* ---- arithmetic helpers shared by modules ---------------------------------------------------------------------- */
+
+/* Truncate toward zero into 32 bits; NaN becomes 0, values outside saturate. */
+static inline int32_t hm2_trunc_s32(const double value)
+{
+    if (!(value > -2147483648.0))
+        return value <= -2147483648.0 ? INT32_MIN : 0;
+    return value >= 2147483647.0 ? INT32_MAX : (int32_t)value;
+}
+
+static inline uint32_t hm2_trunc_u32(const double value)
+{
+    if (!(value > 0.0))
+        return 0;
+    return value >= 4294967295.0 ? UINT32_MAX : (uint32_t)value;
+}
+
+/* Finite, or fallback: what a pin may hold is anybody's guess. */
+static inline double hm2_finite_or(const double value, const double fallback)
+{
+    return value - value == 0.0 ? value : fallback;
+}
+
+#endif

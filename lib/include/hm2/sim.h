@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Simulated cards: the register bus of a HostMot2 FPGA at clock resolution, the LBP16 engine in front of it, and a
+ * network between it and a client that can lose, repeat, reorder, delay, cut and forge datagrams.
+ *
+ * The simulation knows LBP16 and HostMot2 *definitions* (lbp16.h, idrom.h) and nothing of the driver (lib/module,
+ * lib/board): it is written from the firmware's behaviour and must be able to disagree with the driver.
+ *
+ * Time is injected. A card's own time is the index of the next rising edge of ClockLow. Models advance in closed form
+ * from one access to the next; output edges are produced only where something watches. Nothing here is realtime safe
+ * in the strict sense, but packet handling allocates nothing. One thread at a time per card.
+ */
+#ifndef HM2_SIM_H
+#define HM2_SIM_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hm2/err.h>
+#include <hm2/idrom.h>
+#include <hm2/link.h>
+
+struct sim_card;
+
+enum sim_bus { SIM_BUS_ONES, SIM_BUS_ZEROS }; /* what undriven reads give: Xilinx cards ones, Efinix zeros */
+
+struct sim_card_options {
+    const char *profile;           /* "7i96s", "7i93": card name, EEPROM, bus and default firmware */
+    const struct hm2_image *image; /* other firmware instead of the profile's, or NULL */
+    uint64_t seed;                 /* MAC address and random start values */
+    uint8_t ip[4];                 /* shown in EEPROM; zeros = 192.168.1.121 */
+};
+
+HM2_API int HM2_MUST_CHECK sim_card_new(struct sim_card **card, const struct sim_card_options *options,
+                                        struct hm2_diag *diag);
+HM2_API void sim_card_free(struct sim_card *card);
+/* Names of the profiles, NULL-terminated. */
+HM2_API const char *const *sim_profiles(void);
+HM2_API const struct hm2_idrom *sim_card_idrom(const struct sim_card *card);
+/* FPGA reconfigured: every register as after power-up, LBP16 engine reset, EEPROM and flash kept. */
+HM2_API void sim_card_power_cycle(struct sim_card *card);
+
+/* ---- register bus at clock resolution ---------------------------------------------------------------------------
+ * sim_card_advance(card, clk): all edges before clk have happened. A read at clk gives what those edges made. A write
+ * at clk happens at edge clk itself (logic sees the old value at that edge). An input that changes at clk does so
+ * just after edge clk and is first sampled at clk + 1. Time never goes back (earlier times are taken as now). */
+HM2_API int64_t sim_card_clock(const struct sim_card *card);
+HM2_API void sim_card_advance(struct sim_card *card, int64_t clk);
+/* undriven (may be NULL) gets the bits that no module drives; they read as the card's bus rests. */
+HM2_API uint32_t sim_card_read(struct sim_card *card, int64_t clk, uint16_t address, uint32_t *undriven);
+HM2_API void sim_card_write(struct sim_card *card, int64_t clk, uint16_t address, uint32_t value);
+
+/* ---- pins -------------------------------------------------------------------------------------------------------*/
+
+enum sim_level { SIM_LOW = 0, SIM_HIGH = 1, SIM_FLOAT = 2, SIM_PULLUP = 3 };
+
+/* What the world outside does to a pad, just after edge clk. Power-up: SIM_PULLUP. */
+HM2_API int HM2_MUST_CHECK sim_card_drive(struct sim_card *card, int64_t clk, unsigned io, enum sim_level level);
+/* What the FPGA drives on a pad: SIM_LOW, SIM_HIGH or SIM_FLOAT. */
+HM2_API enum sim_level sim_card_pad(struct sim_card *card, unsigned io);
+/* Connect pad to pad by a wire outside: `to` sees what `from` shows. */
+HM2_API int HM2_MUST_CHECK sim_card_wire(struct sim_card *card, unsigned from_io, unsigned to_io);
+
+/* Called for every change of a watched output: clk is the edge after which it shows, ps the time after that edge
+ * (0 but for outputs clocked by ClockHigh). */
+typedef void (*sim_edge_fn)(void *context, int64_t clk, unsigned ps, unsigned watch, enum sim_level level);
+/* Watch what the FPGA drives on a pad. Returns the watch number or an error. */
+HM2_API int HM2_MUST_CHECK sim_card_watch_pad(struct sim_card *card, unsigned io);
+/* Watch a module's output itself, whether or not a pin carries it. */
+HM2_API int HM2_MUST_CHECK sim_card_watch_output(struct sim_card *card, uint8_t gtag, unsigned unit,
+                                                 uint8_t secondary_pin);
+HM2_API void sim_card_on_edge(struct sim_card *card, sim_edge_fn fn, void *context);
+
+/* Drive a module's input directly, whether or not a pin carries it. */
+HM2_API int HM2_MUST_CHECK sim_card_drive_input(struct sim_card *card, int64_t clk, uint8_t gtag, unsigned unit,
+                                                uint8_t secondary_pin, enum sim_level level);
+
+/* An encoder that turns with a step generator, in closed form: count = floor(steps * num / den) since the call,
+ * with the time stamp that the last count would have. No edges, no cost per count. */
+HM2_API int HM2_MUST_CHECK sim_card_follow(struct sim_card *card, unsigned encoder, unsigned stepgen, int32_t num,
+                                           int32_t den);
+
+/* ---- packets ---------------------------------------------------------------------------------------------------- */
+
+/* Card time that belongs to a time of the outside world; set once, then advanced by the packet functions. */
+HM2_API void sim_card_set_time(struct sim_card *card, int64_t now_ns);
+/* One datagram arrives at now_ns. Returns the length of the reply (0 = none) and when it leaves in *reply_ns. */
+HM2_API size_t sim_card_packet(struct sim_card *card, int64_t now_ns, const uint8_t *request, size_t request_len,
+                               uint8_t *reply, size_t capacity, int64_t *reply_ns);
+
+/* ---- the network between, with faults from a seed --------------------------------------------------------------- */
+
+struct sim_faults {
+    uint64_t seed;
+    double loss, duplicate, reorder, truncate, foreign; /* probability per datagram, each direction, 0..1 */
+    int64_t delay_min_ns, delay_max_ns;                 /* uniform, on top of the card's own time */
+};
+
+struct sim_net;
+
+/* A client's view of a card through such a network, in virtual time: a struct link whose now_ns is the network's
+ * clock. recv() with a deadline lets virtual time pass up to the reply or the deadline. */
+HM2_API int HM2_MUST_CHECK sim_net_new(struct sim_net **net, struct sim_card *card, const struct sim_faults *faults);
+HM2_API void sim_net_free(struct sim_net *net);
+HM2_API struct link *sim_net_link(struct sim_net *net); /* owned by the net; its close() does nothing */
+HM2_API void sim_net_set_faults(struct sim_net *net, const struct sim_faults *faults);
+HM2_API void sim_net_sleep_until(struct sim_net *net, int64_t now_ns);
+HM2_API void sim_net_freeze(struct sim_net *net, bool frozen); /* the card hears and says nothing */
+/* What really happened, by cause. Datagrams to the card (0) and from it (1). */
+struct sim_net_truth {
+    uint64_t sent[2], lost[2], duplicated[2], reordered[2], truncated[2], foreign[2];
+};
+HM2_API struct sim_net_truth sim_net_truth(const struct sim_net *net);
+
+#endif

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Inside of the simulated card: what a module model is and what it may ask of its card. See hm2/sim.h for time. */
+#ifndef SIM_CARD_H
+#define SIM_CARD_H
+
+#include <hm2/sim.h>
+
+#define SIM_NEVER INT64_MAX
+
+struct sim_module;
+
+/*
+ * One kind of module. `clk` below is always card time: advance(m, clk) makes all edges before clk happen, in closed
+ * form where nothing can be seen in between. Before read, write, output, input and next_event the card has advanced
+ * the module to its own present clk.
+ */
+struct sim_module_ops {
+    uint8_t gtag;
+    const char *name;
+    unsigned pages;    /* register pages it answers on, from md->base on (more than the IDROM declares) */
+    size_t state_size; /* zeroed memory at m->state */
+    /* Called once after m->md is set. May allocate more; 0 or an error. */
+    int (*init)(struct sim_module *m);
+    void (*release)(struct sim_module *m);              /* may be NULL */
+    void (*power_up)(struct sim_module *m);             /* registers as after configuration, time = card's clk */
+    void (*advance)(struct sim_module *m, int64_t clk); /* may be NULL for modules without time */
+    /* page = register number (address - base) / 0x100; low = address & 0xFC. The module decodes low into instance as
+     * its firmware does. *undriven: bits it does not drive. */
+    uint32_t (*read)(struct sim_module *m, unsigned page, unsigned low, uint32_t *undriven);
+    /* Happens at edge clk = card time: logic sees the old value at that edge, the new one from the next edge on. */
+    void (*write)(struct sim_module *m, unsigned page, unsigned low, uint32_t value);
+    /* Level of an output (secondary pin code, bit 7 set) as the edges so far have made it. */
+    enum sim_level (*output)(struct sim_module *m, unsigned unit, uint8_t secondary_pin);
+    /* An input changed just after the edge before the present clk. */
+    void (*input)(struct sim_module *m, unsigned unit, uint8_t secondary_pin, bool level);
+    /* Earliest edge >= present clk after which a watched output may change (earlier is allowed, later is not);
+     * SIM_NEVER when none is coming by itself. NULL = never. */
+    int64_t (*next_event)(struct sim_module *m);
+    /* Outputs clocked by ClockHigh: report every change in edges [from, to) of ClockLow, with picoseconds. Used
+     * instead of next_event when not NULL. */
+    void (*trace)(struct sim_module *m, unsigned unit, uint8_t secondary_pin, int64_t from, int64_t to,
+                  void (*report)(void *context, int64_t clk, unsigned ps, enum sim_level level), void *context);
+    void (*bite)(struct sim_module *m); /* the watchdog bit: outputs that it clears. May be NULL */
+};
+
+struct sim_module {
+    const struct sim_module_ops *ops;
+    struct sim_card *card;
+    struct hm2_md md;
+    void *state;
+    int64_t clk;  /* edges before this have been made */
+    bool watched; /* some output is watched or wired: next_event matters */
+};
+
+/* Every model, NULL-terminated; a new one is one line in lib/sim/models.c. */
+extern const struct sim_module_ops *const sim_models[];
+
+/* ---- what a model may ask of its card --------------------------------------------------------------------------- */
+
+uint32_t sim_clock_low_hz(const struct sim_card *card);
+uint32_t sim_clock_high_hz(const struct sim_card *card);
+const struct hm2_idrom *sim_idrom(const struct sim_card *card);
+/* First module with this tag, or NULL; advanced to the card's present clk. */
+struct sim_module *sim_find(struct sim_card *card, uint8_t gtag);
+/* The watchdog bites now: every module's bite() runs. */
+void sim_bite(struct sim_card *card);
+
+/* DPLL timers seen by other modules (0 = reference, 1..4): the last rising edge before clk and the first one at or
+ * after clk; SIM_NEVER (or INT64_MIN) when there is none. Answered by the HM2DPLL model. */
+int64_t sim_dpll_last_rise(struct sim_card *card, unsigned timer, int64_t clk);
+int64_t sim_dpll_next_rise(struct sim_card *card, unsigned timer, int64_t clk);
+
+/* Position of a step generator at the module's present clk, 48.. bits: steps * 2^32 (for followers). */
+int64_t sim_stepgen_position(struct sim_card *card, unsigned stepgen);
+
+#endif
