@@ -111,10 +111,12 @@ struct hm2_module {
     unsigned instances;      /* in use */
     void *context;
     const char *prefix; /* of the board */
+    uint32_t *noticed;  /* HM2_NOTICES counters of what hm2_notice() was told, or NULL */
 };
 
-/* Report a condition from a cycle: counts it and keeps the first occurrence for the board's message queue.
- * instance and value go into the message. Realtime safe. */
+/* Report a condition from a cycle, in every cycle in which it holds: counts it, and hands it to the board's message
+ * queue when it is new (again after it has been absent for about a second). instance and value go into the message.
+ * Without a board only the counters move, so a module can be tested alone. Realtime safe. */
 HM2_API void hm2_notice(const struct hm2_module *module, enum hm2_notice notice, unsigned instance, double value);
 
 /* Claim every pin whose secondary tag is the module's (or gtag) and whose unit is below units or global. filter may
