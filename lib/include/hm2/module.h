@@ -17,6 +17,7 @@
 #include <hm2/config.h>
 #include <hm2/err.h>
 #include <hm2/idrom.h>
+#include <hm2/number.h>
 #include <hm2/plan.h>
 #include <hm2/points.h>
 
@@ -119,36 +120,14 @@ struct hm2_module {
  * Without a board only the counters move, so a module can be tested alone. Realtime safe. */
 HM2_API void hm2_notice(const struct hm2_module *module, enum hm2_notice notice, unsigned instance, double value);
 
-/* Claim every pin whose secondary tag is the module's (or gtag) and whose unit is below units or global. filter may
- * be NULL; it may refuse single pins. Already claimed pins are a violation reported in diag. */
+/* Claim every pin whose secondary tag is gtag (HM2_GTAG_NONE: the module's own) and whose unit is below units; global
+ * pins are claimed when units > 0. filter may be NULL; it may refuse single pins. Already claimed pins are a violation:
+ * each is reported in diag, and HM2_ERR_MISMATCH is returned. */
 HM2_API int HM2_MUST_CHECK hm2_claim_pins(const struct hm2_module *module, struct hm2_setup *setup, uint8_t gtag,
                                           unsigned units, bool immediate,
                                           bool (*filter)(const struct hm2_pd *pd, const struct hm2_setup *setup));
 
 /* Every module type this library knows, in the order in which they are unpacked and packed; NULL-terminated. */
 HM2_API extern const struct hm2_module_type *const hm2_module_types[];
-
-/* ---- arithmetic helpers shared by modules ---------------------------------------------------------------------- */
-
-/* Truncate toward zero into 32 bits; NaN becomes 0, values outside saturate. */
-static inline int32_t hm2_trunc_s32(const double value)
-{
-    if (!(value > -2147483648.0))
-        return value <= -2147483648.0 ? INT32_MIN : 0;
-    return value >= 2147483647.0 ? INT32_MAX : (int32_t)value;
-}
-
-static inline uint32_t hm2_trunc_u32(const double value)
-{
-    if (!(value > 0.0))
-        return 0;
-    return value >= 4294967295.0 ? UINT32_MAX : (uint32_t)value;
-}
-
-/* Finite, or fallback: what a pin may hold is anybody's guess. */
-static inline double hm2_finite_or(const double value, const double fallback)
-{
-    return value - value == 0.0 ? value : fallback;
-}
 
 #endif

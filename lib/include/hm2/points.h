@@ -64,8 +64,14 @@ struct hm2_binder {
     int (*alias)(struct hm2_binder *binder, const char *existing, const char *alias);
 };
 
+/* Store a number in a value of the point's type, as hm2/number.h converts (bit: true unless 0). Realtime safe. */
+HM2_API void hm2_point_store(enum hm2_point_type type, void *value, double number);
+/* The value as a double. Realtime safe. */
+HM2_API double hm2_point_load(enum hm2_point_type type, const void *value);
+
 /* Create every row of a table for the struct at base (which must lie in memory from the binder's alloc). Full name =
- * prefix "." name. index replaces "##" or "###" in names. Stores the initial values. Stops at the first failure. */
+ * prefix "." name. index replaces every "##" or "###" in names, zero padded. Stores the initial values. Stops at the
+ * first failure: HM2_ERR_NOSPACE for a full name of HM2_NAME_SIZE or more characters, else what the binder returned. */
 HM2_API int HM2_MUST_CHECK hm2_bind_points(struct hm2_binder *binder, const struct hm2_point *points, size_t count,
                                            void *base, const char *prefix, unsigned index, struct hm2_diag *diag);
 
@@ -73,7 +79,8 @@ HM2_API int HM2_MUST_CHECK hm2_bind_points(struct hm2_binder *binder, const stru
 
 struct hm2_plain_binder;
 
-/* A binder that keeps the values in its own memory. NULL when there is no memory. */
+/* A binder that keeps the values in its own memory; they never move. Duplicate names and names of HM2_NAME_SIZE or more
+ * characters are refused. An object has at most one alias. NULL when there is no memory. */
 HM2_API struct hm2_plain_binder *hm2_plain_binder_new(void);
 HM2_API void hm2_plain_binder_free(struct hm2_plain_binder *plain);
 HM2_API struct hm2_binder *hm2_plain_binder(struct hm2_plain_binder *plain);
