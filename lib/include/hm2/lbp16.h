@@ -109,8 +109,9 @@ struct lbp16_parser {
 HM2_API void lbp16_parser_init(struct lbp16_parser *parser, const void *data, size_t len);
 /* Next command: 1 = *command filled, *payload points at its write data (NULL for reads) and *payload_len bytes of
  * them are present (the firmware accepts fewer than announced: the caller decides), 0 = end (a single stray byte at
- * the end is ignored, as the firmware does), HM2_ERR_MALFORMED = count 0. A missing address yields address 0 with
- * truncated = true. */
+ * the end is ignored, as the firmware does), HM2_ERR_MALFORMED = count 0 (stop then: the firmware does too). A missing
+ * address yields address 0, fewer data than announced a shorter payload; both set *truncated. An empty datagram has
+ * no commands; that the firmware counts it as a parse error is the caller's business. */
 HM2_API int HM2_MUST_CHECK lbp16_parser_next(struct lbp16_parser *parser, struct lbp16_command *command,
                                              const uint8_t **payload, size_t *payload_len, bool *truncated);
 
