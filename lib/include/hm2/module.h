@@ -93,7 +93,11 @@ struct hm2_module_type {
     /* After the reply was judged fresh but before unpack, a write had been lost: modules with self-clearing bits
      * learn here that what they sent did not arrive. Most need nothing (sections are resent). May be NULL. */
     void (*write_lost)(struct hm2_module *module);
-    /* Tables of the points, for documentation and tests; NULL-terminated list of {prefix pattern, rows, count}. */
+    /* HAL name of an output pin of this module ("step"), from which a port makes the second names of the pin's
+     * parameters ("stepgen.00.step.invert_output", hal-interface 2.3). NULL for a pin that has no such name, e.g. an
+     * input; the function itself may be NULL when no pin has one. */
+    const char *(*output_name)(const struct hm2_pd *pd);
+    /* Tables of the points, for documentation and tests; the list ends with a row whose prefix is NULL. */
     const struct hm2_point_group *groups;
 };
 
