@@ -12,7 +12,9 @@ struct sim_module;
 /*
  * One kind of module. `clk` below is always card time: advance(m, clk) makes all edges before clk happen, in closed
  * form where nothing can be seen in between. Before read, write, output, input and next_event the card has advanced
- * the module to its own present clk.
+ * the module to its own present clk; modules that nobody looks at are advanced late. The card sets m->clk after
+ * advance() and calls it only when m->clk < clk; a model may also move m->clk on by itself (after a write that made
+ * edge clk, say). Writes take their edge: after a write at clk the card's present clk is clk + 1.
  */
 struct sim_module_ops {
     uint8_t gtag;
@@ -32,16 +34,23 @@ struct sim_module_ops {
     /* Level of an output (secondary pin code, bit 7 set) as the edges so far have made it. */
     enum sim_level (*output)(struct sim_module *m, unsigned unit, uint8_t secondary_pin);
     /* An input changed just after the edge before the present clk. */
+    /* Called for every input pin after power_up, too. unit is that of the pin descriptor: HM2_UNIT_GLOBAL = all
+     * instances. A floating pad is low. */
     void (*input)(struct sim_module *m, unsigned unit, uint8_t secondary_pin, bool level);
     /* Earliest edge >= present clk after which a watched output may change (earlier is allowed, later is not);
      * SIM_NEVER when none is coming by itself. NULL = never. */
     int64_t (*next_event)(struct sim_module *m);
     /* Outputs clocked by ClockHigh: report every change in edges [from, to) of ClockLow, with picoseconds. Used
-     * instead of next_event when not NULL. */
+     * instead of next_event when not NULL. Called with m->clk == from, before advance(m, to); changes nothing. */
     void (*trace)(struct sim_module *m, unsigned unit, uint8_t secondary_pin, int64_t from, int64_t to,
                   void (*report)(void *context, int64_t clk, unsigned ps, enum sim_level level), void *context);
     void (*bite)(struct sim_module *m); /* the watchdog bit: outputs that it clears. May be NULL */
 };
+
+/* The card asks the IOPort model (one module, unit = port) for what it drives on bit b of a port as
+ * output(m, port, SIM_PORT_PIN(b)): SIM_LOW, SIM_HIGH or SIM_FLOAT. The model in turn uses sim_alternate() for the
+ * secondary function behind a pad and sim_pad_level() for what its data register reads. */
+#define SIM_PORT_PIN(b) ((uint8_t)(HM2_PIN_OUTPUT | (b)))
 
 struct sim_module {
     const struct sim_module_ops *ops;
@@ -49,7 +58,8 @@ struct sim_module {
     struct hm2_md md;
     void *state;
     int64_t clk;  /* edges before this have been made */
-    bool watched; /* some output is watched or wired: next_event matters */
+    bool watched; /* some output is watched or wired: next_event matters. A model whose events act on other modules
+                   * (watchdog) sets it in init; never cleared */
 };
 
 /* Every model, NULL-terminated; a new one is one line in lib/sim/models.c. */
@@ -62,8 +72,15 @@ uint32_t sim_clock_high_hz(const struct sim_card *card);
 const struct hm2_idrom *sim_idrom(const struct sim_card *card);
 /* First module with this tag, or NULL; advanced to the card's present clk. */
 struct sim_module *sim_find(struct sim_card *card, uint8_t gtag);
-/* The watchdog bites now: every module's bite() runs. */
+/* The card's present clk (edges before it have been made). */
+int64_t sim_now(const struct sim_card *card);
+/* The watchdog bites now (called from its advance(), while it makes the edge at which the outputs go): every module's
+ * bite() runs, and the pads are looked at again. next_event() must have announced that edge. */
 void sim_bite(struct sim_card *card);
+/* Level of the secondary output behind a pad (SIM_LOW when it has none, or no model). */
+enum sim_level sim_alternate(struct sim_card *card, unsigned io);
+/* Level of a pad: driven by the FPGA, else by the world outside; SIM_FLOAT when nobody drives or pulls it. */
+enum sim_level sim_pad_level(struct sim_card *card, unsigned io);
 
 /* DPLL timers seen by other modules (0 = reference, 1..4): the last rising edge before clk and the first one at or
  * after clk; SIM_NEVER (or INT64_MIN) when there is none. Answered by the HM2DPLL model. */

@@ -23,13 +23,16 @@
 
 struct sim_card;
 
-enum sim_bus { SIM_BUS_ONES, SIM_BUS_ZEROS }; /* what undriven reads give: Xilinx cards ones, Efinix zeros */
+/* What undriven reads give: Xilinx cards ones, Efinix cards zeros (register map 1.1). */
+enum sim_bus { SIM_BUS_OF_PROFILE, SIM_BUS_ONES, SIM_BUS_ZEROS };
 
 struct sim_card_options {
-    const char *profile;           /* "7i96s", "7i93": card name, EEPROM, bus and default firmware */
-    const struct hm2_image *image; /* other firmware instead of the profile's, or NULL */
-    uint64_t seed;                 /* MAC address and random start values */
-    uint8_t ip[4];                 /* shown in EEPROM; zeros = 192.168.1.121 */
+    const char *profile;           /* "7i96s", "7i93", ...: card name, EEPROM, bus and default firmware */
+    const struct hm2_image *image; /* other firmware instead of the profile's, or NULL; faulty ones are carried too */
+    uint64_t seed;                 /* MAC address and start of the time stamps */
+    uint8_t ip[4];                 /* address of the card, also in the EEPROM; zeros = those of the profile */
+    uint8_t mac[6];                /* zeros = Mesa's prefix and three bytes from the seed */
+    enum sim_bus bus;
 };
 
 HM2_API int HM2_MUST_CHECK sim_card_new(struct sim_card **card, const struct sim_card_options *options,
@@ -59,7 +62,8 @@ enum sim_level { SIM_LOW = 0, SIM_HIGH = 1, SIM_FLOAT = 2, SIM_PULLUP = 3 };
 HM2_API int HM2_MUST_CHECK sim_card_drive(struct sim_card *card, int64_t clk, unsigned io, enum sim_level level);
 /* What the FPGA drives on a pad: SIM_LOW, SIM_HIGH or SIM_FLOAT. */
 HM2_API enum sim_level sim_card_pad(struct sim_card *card, unsigned io);
-/* Connect pad to pad by a wire outside: `to` sees what `from` shows. */
+/* Connect pad to pad by a wire outside: `to` sees what `from` shows. HM2_ERR_STATE when `to` has a wire already or the
+ * wires would make a ring. */
 HM2_API int HM2_MUST_CHECK sim_card_wire(struct sim_card *card, unsigned from_io, unsigned to_io);
 
 /* Called for every change of a watched output: clk is the edge after which it shows, ps the time after that edge
@@ -70,6 +74,8 @@ HM2_API int HM2_MUST_CHECK sim_card_watch_pad(struct sim_card *card, unsigned io
 /* Watch a module's output itself, whether or not a pin carries it. */
 HM2_API int HM2_MUST_CHECK sim_card_watch_output(struct sim_card *card, uint8_t gtag, unsigned unit,
                                                  uint8_t secondary_pin);
+/* Level of a watched output as last reported (at first: as it was when the watch was set). */
+HM2_API enum sim_level sim_card_watched(struct sim_card *card, unsigned watch);
 HM2_API void sim_card_on_edge(struct sim_card *card, sim_edge_fn fn, void *context);
 
 /* Drive a module's input directly, whether or not a pin carries it. */

@@ -1,0 +1,304 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The card as a register bus: modules behind their pages, and the clock that all of them share. */
+#include "card_state.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "profiles.h"
+
+#define PAGE_SHIFT       8
+#define PAGE_ID          (HM2_ADDR_COOKIE >> PAGE_SHIFT)
+#define PAGE_IDROM_GUARD 0x08u /* bit 0 = IDROM write enable (register map 1.2) */
+#define IDROM_PAGES      4u
+
+/* ---- time ---------------------------------------------------------------------------------------------------------
+ */
+
+void sim_sync(struct sim_module *const m)
+{
+    const int64_t clk = m->card->clk;
+    if (m->clk >= clk)
+        return;
+    if (m->ops->advance)
+        m->ops->advance(m, clk);
+    if (m->clk < clk)
+        m->clk = clk;
+}
+
+static void sync_watched(struct sim_card *const card)
+{
+    for (unsigned i = 0; i < card->module_count; i++)
+        if (card->modules[i].watched)
+            sim_sync(&card->modules[i]);
+}
+
+/* All edges before clk happen; after each edge that somebody may see, everybody looks. */
+static void run_to(struct sim_card *const card, const int64_t clk)
+{
+    while (card->clk < clk) {
+        const int64_t event = sim_pins_next_event(card, clk);
+        const int64_t to = event < clk ? event + 1 : clk;
+        sim_pins_trace(card, to);
+        card->clk = to;
+        sync_watched(card);
+        sim_pins_settle(card, to - 1);
+    }
+}
+
+int64_t sim_card_clock(const struct sim_card *const card)
+{
+    return card->clk;
+}
+
+int64_t sim_now(const struct sim_card *const card)
+{
+    return card->clk;
+}
+
+void sim_card_advance(struct sim_card *const card, const int64_t clk)
+{
+    run_to(card, clk);
+}
+
+/* ---- registers ----------------------------------------------------------------------------------------------------
+ */
+
+/* The IDROM answers on 1 KiB from where the pointer register says (register map 1.2). */
+static bool idrom_word(const struct sim_card *const card, const uint16_t address, unsigned *const word)
+{
+    const unsigned first_page = (card->image.id[3] & 0xFC00u) >> PAGE_SHIFT;
+    const unsigned page = address >> PAGE_SHIFT;
+    *word = (address & 0x3FFu) / 4;
+    return page >= first_page && page < first_page + IDROM_PAGES;
+}
+
+static uint32_t read_module(struct sim_card *const card, const uint16_t address, uint32_t *const undriven)
+{
+    struct sim_module *const m = card->page_owner[address >> PAGE_SHIFT];
+    if (!m || !m->ops->read) {
+        *undriven = UINT32_MAX;
+        return 0;
+    }
+    sim_sync(m);
+    return m->ops->read(m, (unsigned)((address - m->md.base) >> PAGE_SHIFT), address & 0xFCu, undriven);
+}
+
+uint32_t sim_card_read(struct sim_card *const card, const int64_t clk, const uint16_t address, uint32_t *const undriven)
+{
+    run_to(card, clk);
+    uint32_t floating = 0;
+    uint32_t value;
+    unsigned word;
+    if (address >> PAGE_SHIFT == PAGE_ID)
+        value = card->image.id[address / 4 & 3u]; /* only bits 3..2 are decoded (register map 1.1) */
+    else if (idrom_word(card, address, &word))
+        value = card->image.rom[word];
+    else if (address >> PAGE_SHIFT == PAGE_IDROM_GUARD)
+        value = card->idrom_writable;
+    else
+        value = read_module(card, address, &floating);
+    if (undriven)
+        *undriven = floating;
+    return (value & ~floating) | (card->undriven_value & floating);
+}
+
+static void write_module(struct sim_card *const card, const uint16_t address, const uint32_t value)
+{
+    struct sim_module *const m = card->page_owner[address >> PAGE_SHIFT];
+    if (!m || !m->ops->write)
+        return;
+    sim_sync(m);
+    m->ops->write(m, (unsigned)((address - m->md.base) >> PAGE_SHIFT), address & 0xFCu, value);
+    if (m == card->ioport)
+        card->pads_stale = true;
+}
+
+void sim_card_write(struct sim_card *const card, const int64_t clk, const uint16_t address, const uint32_t value)
+{
+    run_to(card, clk);
+    unsigned word;
+    if (idrom_word(card, address, &word)) {
+        if (card->idrom_writable)
+            card->image.rom[word] = value;
+    } else if (address >> PAGE_SHIFT == PAGE_IDROM_GUARD) {
+        card->idrom_writable = value & 1u;
+    } else {
+        write_module(card, address, value);
+    }
+    /* The write happened at this edge: what it changed shows just after it. */
+    run_to(card, card->clk + 1);
+}
+
+/* ---- what models ask ----------------------------------------------------------------------------------------------
+ */
+
+uint32_t sim_clock_low_hz(const struct sim_card *const card)
+{
+    return card->idrom.clock_low_hz;
+}
+
+uint32_t sim_clock_high_hz(const struct sim_card *const card)
+{
+    return card->idrom.clock_high_hz;
+}
+
+const struct hm2_idrom *sim_idrom(const struct sim_card *const card)
+{
+    return &card->idrom;
+}
+
+const struct hm2_idrom *sim_card_idrom(const struct sim_card *const card)
+{
+    return &card->idrom;
+}
+
+struct sim_module *sim_module_of(struct sim_card *const card, const uint8_t gtag)
+{
+    for (unsigned i = 0; i < card->module_count; i++)
+        if (card->modules[i].md.gtag == gtag)
+            return &card->modules[i];
+    return NULL;
+}
+
+struct sim_module *sim_find(struct sim_card *const card, const uint8_t gtag)
+{
+    struct sim_module *const m = sim_module_of(card, gtag);
+    if (m)
+        sim_sync(m);
+    return m;
+}
+
+void sim_bite(struct sim_card *const card)
+{
+    for (unsigned i = 0; i < card->module_count; i++) {
+        struct sim_module *const m = &card->modules[i];
+        if (!m->ops->bite)
+            continue;
+        sim_sync(m);
+        m->ops->bite(m);
+    }
+    card->pads_stale = true;
+}
+
+/* ---- making and configuring ---------------------------------------------------------------------------------------
+ */
+
+static const struct sim_module_ops *model_for(const uint8_t gtag)
+{
+    for (const struct sim_module_ops *const *model = sim_models; *model; model++)
+        if ((*model)->gtag == gtag)
+            return *model;
+    return NULL;
+}
+
+static void claim_pages(struct sim_card *const card, struct sim_module *const m)
+{
+    const unsigned first = m->md.base >> PAGE_SHIFT;
+    for (unsigned i = 0; i < m->ops->pages && first + i < SIM_PAGES; i++)
+        if (!card->page_owner[first + i])
+            card->page_owner[first + i] = m;
+}
+
+static int add_module(struct sim_card *const card, const struct hm2_md *const md, struct hm2_diag *const diag)
+{
+    const struct sim_module_ops *const ops = model_for(md->gtag);
+    if (!ops)
+        return 0; /* its registers are driven by nobody */
+    struct sim_module *const m = &card->modules[card->module_count];
+    m->ops = ops;
+    m->card = card;
+    m->md = *md;
+    if (ops->state_size > 0) {
+        m->state = calloc(1, ops->state_size);
+        if (!m->state)
+            return hm2_diag_add(diag, HM2_ERR_NOMEM, "no memory for the simulated %s", ops->name);
+    }
+    card->module_count++;
+    const int err = ops->init ? ops->init(m) : 0;
+    if (err)
+        return hm2_diag_add(diag, err, "the simulated %s module refuses its descriptor (%u instances at 0x%04X): %s",
+                            ops->name, md->instances, md->base, hm2_strerror(err));
+    claim_pages(card, m);
+    if (md->gtag == HM2_GTAG_IOPORT && !card->ioport)
+        card->ioport = m;
+    return 0;
+}
+
+static void power_up(struct sim_card *const card)
+{
+    card->idrom_writable = false;
+    for (unsigned i = 0; i < card->module_count; i++) {
+        struct sim_module *const m = &card->modules[i];
+        m->clk = card->clk;
+        if (m->ops->power_up)
+            m->ops->power_up(m);
+    }
+    sim_pins_power_up(card);
+}
+
+static const struct hm2_image *image_of(const struct sim_card_options *const options,
+                                        const struct sim_profile *const profile, struct hm2_image *const room)
+{
+    if (options->image)
+        return options->image;
+    sim_profile_image(profile, room);
+    return room;
+}
+
+static int build(struct sim_card *const card, const struct sim_card_options *const options, struct hm2_diag *const diag)
+{
+    const struct sim_profile *const profile = sim_profile_find(options->profile);
+    if (!profile)
+        return hm2_diag_add(diag, HM2_ERR_NOTFOUND, "no simulated card is called \"%s\"; there are: %s",
+                            options->profile ? options->profile : "", sim_profile_list());
+    card->profile = profile;
+    struct hm2_image room;
+    card->image = *image_of(options, profile, &room);
+    sim_image_read(&card->image, &card->idrom);
+    const enum sim_bus bus = options->bus != SIM_BUS_OF_PROFILE ? options->bus : profile->bus;
+    card->undriven_value = bus == SIM_BUS_ONES ? UINT32_MAX : 0;
+    for (unsigned i = 0; i < card->idrom.module_count; i++) {
+        const int err = add_module(card, &card->idrom.modules[i], diag);
+        if (err)
+            return err;
+    }
+    for (unsigned io = 0; io < HM2_MAX_PINS; io++)
+        card->pads[io].outside = SIM_PULLUP;
+    power_up(card);
+    return 0;
+}
+
+int sim_card_new(struct sim_card **const card, const struct sim_card_options *const options,
+                 struct hm2_diag *const diag)
+{
+    *card = NULL;
+    struct sim_card *const made = calloc(1, sizeof *made);
+    if (!made)
+        return hm2_diag_add(diag, HM2_ERR_NOMEM, "no memory for a simulated card");
+    const int err = build(made, options, diag);
+    if (err) {
+        sim_card_free(made);
+        return err;
+    }
+    *card = made;
+    return 0;
+}
+
+void sim_card_free(struct sim_card *const card)
+{
+    if (!card)
+        return;
+    for (unsigned i = 0; i < card->module_count; i++) {
+        if (card->modules[i].ops->release)
+            card->modules[i].ops->release(&card->modules[i]);
+        free(card->modules[i].state);
+    }
+    sim_pins_release(card);
+    free(card);
+}
+
+void sim_card_power_cycle(struct sim_card *const card)
+{
+    power_up(card);
+}

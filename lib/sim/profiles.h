@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Cards that can be simulated: what tells one from the other. */
+#ifndef SIM_PROFILES_H
+#define SIM_PROFILES_H
+
+#include <hm2/idrom.h>
+#include <hm2/sim.h>
+
+struct sim_module_row {
+    uint8_t gtag, version, clock_tag, instances;
+    uint16_t base;
+    uint8_t registers, strides;
+    uint32_t multiple;
+};
+
+struct sim_pin_row {
+    uint8_t tag, unit, pin;
+};
+
+struct sim_firmware {
+    char board_name[9];
+    uint32_t fpga_size, fpga_pins;
+    uint32_t io_ports, port_width;
+    uint32_t clock_low_hz, clock_high_hz;
+    const struct sim_module_row *modules;
+    unsigned module_count;
+    const struct sim_pin_row *pins; /* pins behind the last row carry no secondary function */
+    unsigned pin_count;
+    const uint32_t *local_pins; /* descriptors behind the last pin: local I/O (register map 1.5) */
+    unsigned local_pin_count;
+};
+
+struct sim_profile {
+    const char *name;
+    char card_name[17]; /* EEPROM and space 7 */
+    enum sim_bus bus;
+    uint16_t lbp_version, firmware_version; /* space 7 (seed 000, "SPACE 7") */
+    uint8_t ip[4];                          /* that the card uses as its jumpers say */
+    uint8_t eeprom_ip[4];
+    uint8_t flash_id;
+    uint32_t flash_bytes;
+    bool boot_block; /* the flash starts with the loader of Xilinx cards */
+    const struct sim_firmware *firmware;
+};
+
+const struct sim_profile *sim_profile_find(const char *name);
+/* All names in one string, for messages. */
+const char *sim_profile_list(void);
+void sim_profile_image(const struct sim_profile *profile, struct hm2_image *image);
+
+#endif
