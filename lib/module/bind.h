@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Binding of a module's point groups. Private to lib/module. */
+#ifndef HM2_MODULE_BIND_H
+#define HM2_MODULE_BIND_H
+
+#include <hm2/module.h>
+
+/* Create the points of a documented group for the struct at base. The group's prefix ("stepgen.##") is put behind the
+ * board's, and the run of '#' in it is replaced by index. Set-up time only. */
+int HM2_MUST_CHECK hm2_bind_group(const struct hm2_setup *setup, const struct hm2_point_group *group, void *base,
+                                  unsigned index);
+
+/* Zeroed memory from the host, or NULL with the reason in the set-up's diag. */
+void *hm2_setup_alloc(const struct hm2_setup *setup, size_t size);
+
+#endif
