@@ -115,7 +115,9 @@ struct hm2_idrom_expect {
 /*
  * Decode and check an image (all checks of section 1.6 and hal-interface 1.4). Every violation found is reported in
  * diag, each as one sentence with field, value found and value expected; the parse goes on as far as it is safe.
- * Returns 0, or HM2_ERR_MISMATCH when anything was wrong (out is then not to be used). expect may be NULL.
+ * Returns 0, or HM2_ERR_MISMATCH when anything was wrong: out then holds what could be decoded, all counts within their
+ * limits, good for a report but not for driving the card. expect may be NULL. Whether a module's version, register
+ * count, stride and mask suit its driver is checked when the card is set up (hal-interface 1.5), not here.
  */
 HM2_API int HM2_MUST_CHECK hm2_idrom_parse(const struct hm2_image *image, const struct hm2_idrom_expect *expect,
                                            struct hm2_idrom *out, struct hm2_diag *diag);
@@ -124,6 +126,9 @@ HM2_API int HM2_MUST_CHECK hm2_idrom_parse(const struct hm2_image *image, const 
  * ROM that are not listed are 0). HM2_ERR_MALFORMED with the line number in diag. */
 HM2_API int HM2_MUST_CHECK hm2_image_from_text(const char *text, size_t len, struct hm2_image *image,
                                                struct hm2_diag *diag);
+
+/* FNV-1a, 64 bit, over id[] and rom[] as bytes in little-endian order. Realtime safe. */
+HM2_API uint64_t hm2_image_fingerprint(const struct hm2_image *image);
 
 /* First module with this tag, NULL when there is none. */
 HM2_API const struct hm2_md *hm2_idrom_find(const struct hm2_idrom *idrom, uint8_t gtag);
@@ -137,8 +142,11 @@ static inline uint16_t hm2_md_address(const struct hm2_md *const md, const unsig
 
 /* Name of a module type as messages and listings print it ("StepGen"); "unknown" for an unlisted tag. */
 HM2_API const char *hm2_tag_name(uint8_t gtag);
-/* Text of a pin's secondary function as a listing prints it ("Step", "Quad-A"); buf receives generated names.
- * Returns buf or a constant string. */
+/* Text of a pin's secondary function as LinuxCNC's listing prints it ("Step", "Muxed A", "GPIO" without one); buf
+ * receives generated names ("tx3", "unknown-pin-9"). Returns buf or a constant string. */
 HM2_API const char *hm2_pin_function(const struct hm2_pd *pd, char *buf, size_t size);
+/* Number of the connector pin that carries I/O number io on a card with this port width (1.7): odd pins of a 50-pin
+ * header, DB25 order, or I/O number + 1. 0 = no connector of this width is known. */
+HM2_API unsigned hm2_connector_pin(uint32_t port_width, unsigned io);
 
 #endif

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "idrom_files.h"
+#include "unit.h"
+
+char *load_text(const char *const path, size_t *const len)
+{
+    FILE *const file = fopen(path, "rb");
+    if (!file)
+        fail_msg("%s cannot be opened", path);
+    const size_t capacity = 1u << 20;
+    char *const text = malloc(capacity);
+    assert_non_null(text);
+    *len = fread(text, 1, capacity - 1, file);
+    text[*len] = '\0';
+    assert_int_equal(fclose(file), 0);
+    return text;
+}
+
+void load_image(const char *const path, struct hm2_image *const image)
+{
+    size_t len;
+    char *const text = load_text(path, &len);
+    struct hm2_diag diag = {0};
+    if (hm2_image_from_text(text, len, image, &diag) != 0)
+        fail_msg("%s: %s", path, diag.text);
+    free(text);
+}
