@@ -37,7 +37,7 @@ struct hm2_board_type {
 
 /* Row for a card name (longest match first); for an unknown card the catch-all row, never NULL. */
 HM2_API const struct hm2_board_type *hm2_board_type_find(const char name[HM2_BOARD_NAME_BYTES]);
-/* The table, for listings and tests. */
+/* The table, for listings and tests: NULL behind its last row, the catch-all, whose stem and name are "". */
 HM2_API const struct hm2_board_type *hm2_board_type_at(size_t index);
 
 struct hm2_board;

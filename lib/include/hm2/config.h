@@ -46,16 +46,22 @@ struct hm2_config {
     bool sserial_given;                                                 /* any sserial_port_ token seen */
     char sserial_mode[HM2_CFG_SSERIAL_PORTS][HM2_CFG_SSERIAL_CHANNELS]; /* '0'..'9', 'x', default '0' */
     bool sserial_port_given[HM2_CFG_SSERIAL_PORTS];
+    bool sserial_port_used[HM2_CFG_SSERIAL_PORTS]; /* a token with at least one digit was seen */
     char ssi_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];
     char biss_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];
     char fanuc_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];
 };
 
+/* Set everything to what an empty string means. */
 HM2_API void hm2_config_default(struct hm2_config *config);
-/* text may be NULL or empty. Unlike LinuxCNC, trailing garbage, negative counts and unknown characters are refused;
- * every problem of the string is reported, with the token. Returns 0 or HM2_ERR_INVALID. */
+/* text may be NULL or empty. Unlike LinuxCNC, trailing garbage, negative counts (but -1 = all) and unknown characters
+ * are refused; every problem of the string is reported, with the token. A key given twice counts as given last.
+ * Returns 0 or HM2_ERR_INVALID; *config is then not to be used. */
 HM2_API int HM2_MUST_CHECK hm2_config_parse(const char *text, struct hm2_config *config, struct hm2_diag *diag);
 /* Key of a count as the user writes it ("num_stepgens"). */
 HM2_API const char *hm2_config_key(enum hm2_config_count which);
+/* Smart-serial ports to use out of those the firmware has: all without a sserial_port_ token; otherwise up to the
+ * highest port whose token has a digit, so that "sserial_port_0=xxxxxxxx" alone means none (hal-interface 1.2). */
+HM2_API unsigned hm2_config_sserial_ports(const struct hm2_config *config, unsigned available);
 
 #endif
