@@ -88,7 +88,7 @@ help: ## this list
 $(BUILDDIR)/obj/lib/sim/%.o: EXTRA_CPPFLAGS := -Ilib/sim
 $(BUILDDIR)/obj/lib/halhost/%.o: EXTRA_CPPFLAGS := -Ilib/halhost -Ilib/halhost/include
 $(BUILDDIR)/obj/components/%.o: EXTRA_CPPFLAGS := -Icomponents -Ilib/halhost/include -DRTAPI -D__MODULE__
-$(BUILDDIR)/obj/tools/%.o: EXTRA_CPPFLAGS := -Ilib/halhost -Ilib/halhost/include -DHM2_VERSION='"$(VERSION)"' \
+$(BUILDDIR)/obj/tools/%.o: EXTRA_CPPFLAGS := -Ilib/sim -Ilib/halhost -Ilib/halhost/include -DHM2_VERSION='"$(VERSION)"' \
 	-DHM2_SOURCE_DIR='"$(SRCDIR)"' $(EDIT_CFLAGS)
 $(BUILDDIR)/obj/tests/%.o: EXTRA_CPPFLAGS := -Ilib/sim -Ilib/halhost -Ilib/halhost/include -Ilib/board -Ilib/module \
 	-Ilib/hostmot2 -DTEST_DATA='"$(SRCDIR)/tests/data"' -DTEST_BUILD='"$(abspath $(BUILDDIR))"' \

@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The kinds of trace folders: what each one was recorded from and what the names in its events mean. A further kind
+ * is one row here. Addresses are those of the old map (register map 2.2), which the recorded firmware has; each
+ * folder's README gives them too.
+ */
+#include "replay_trace.h"
+
+/* ---- encoder ------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register encoder_registers[] = {
+    {"count", 0x3000, 4},     {"control", 0x3100, 4},    {"tsdiv", 0x3200, 0},
+    {"timestamp", 0x3300, 0}, {"filterrate", 0x3400, 0}, {NULL, 0, 0},
+};
+
+static const struct replay_signal encoder_signals[] = {
+    {"A", REPLAY_INPUT, HM2_GTAG_ENCODER, 0x01, 0},     {"B", REPLAY_INPUT, HM2_GTAG_ENCODER, 0x02, 0},
+    {"index", REPLAY_INPUT, HM2_GTAG_ENCODER, 0x03, 0}, {"mask", REPLAY_INPUT, HM2_GTAG_ENCODER, 0x04, 0},
+    {"probe", REPLAY_INPUT, HM2_GTAG_ENCODER, 0x05, 0}, {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+/* ---- encoder_muxed ------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register muxed_registers[] = {
+    {"count", 0x3500, 4},     {"control", 0x3600, 4},    {"tsdiv", 0x3700, 0},
+    {"timestamp", 0x3800, 0}, {"filterrate", 0x3900, 0}, {NULL, 0, 0},
+};
+
+static const struct replay_signal muxed_signals[] = {
+    {"select", REPLAY_OUTPUT, HM2_GTAG_MUXED_ENCODER_SEL, 0x81, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+/* ---- pwmgen --------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register pwmgen_registers[] = {
+    {"value", 0x4000, 4},   {"mode", 0x4100, 4},   {"pwmrate", 0x4200, 0},
+    {"pdmrate", 0x4300, 0}, {"enable", 0x4400, 0}, {NULL, 0, 0},
+};
+
+static const struct replay_signal pwmgen_signals[] = {
+    {"A", REPLAY_OUTPUT, HM2_GTAG_PWMGEN, 0x81, 0},
+    {"B", REPLAY_OUTPUT, HM2_GTAG_PWMGEN, 0x82, 0},
+    {"ena", REPLAY_OUTPUT, HM2_GTAG_PWMGEN, 0x83, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+/* ---- stepgen -------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register stepgen_registers[] = {
+    {"rate", 0x2000, 4},      {"accum", 0x2100, 4},   {"mode", 0x2200, 4},
+    {"dirsetup", 0x2300, 4},  {"dirhold", 0x2400, 4}, {"steplen", 0x2500, 4},
+    {"stepspace", 0x2600, 4}, {"table", 0x2700, 4},   {"tablemax", 0x2800, 4},
+    {"basicrate", 0x2900, 0}, {NULL, 0, 0},
+};
+
+static const struct replay_signal stepgen_signals[] = {
+    {"step", REPLAY_OUTPUT, HM2_GTAG_STEPGEN, 0x81, 0},
+    {"dir", REPLAY_OUTPUT, HM2_GTAG_STEPGEN, 0x82, 0},
+    {"out2", REPLAY_OUTPUT, HM2_GTAG_STEPGEN, 0x83, 0},
+    {"out3", REPLAY_OUTPUT, HM2_GTAG_STEPGEN, 0x84, 0},
+    {"out4", REPLAY_OUTPUT, HM2_GTAG_STEPGEN, 0x85, 0},
+    {"out5", REPLAY_OUTPUT, HM2_GTAG_STEPGEN, 0x86, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+/* ---- watchdog, ioport ----------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register watchdog_registers[] = {
+    {"steprate", 0x2000, 4},
+    {"stepaccum", 0x2100, 4},
+    {"stepbasicrate", 0x2900, 0},
+    {NULL, 0, 0},
+};
+
+static const struct replay_vector pad_vectors[] = {
+    {"pins", NULL, 48, false},
+    {NULL, NULL, 0, false},
+};
+
+static const struct replay_signal led_outputs[] = {
+    {"led0", REPLAY_OUTPUT, HM2_GTAG_LED, 0x81, 0},
+    {"led1", REPLAY_OUTPUT, HM2_GTAG_LED, 0x81, 1},
+    {"led2", REPLAY_OUTPUT, HM2_GTAG_LED, 0x81, 2},
+    {"led3", REPLAY_OUTPUT, HM2_GTAG_LED, 0x81, 3},
+};
+
+static const struct replay_vector ioport_vectors[] = {
+    {"pins", NULL, 48, false},
+    {"leds", led_outputs, 4, false},
+    {NULL, NULL, 0, false},
+};
+
+/* ---- hm2dpll -------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register hm2dpll_registers[] = {
+    {"baserate", 0x7000, 0}, {"phase", 0x7100, 0},
+    {"control0", 0x7200, 0}, {"control1", 0x7300, 0},
+    {"sync", 0x7600, 0},     {"timers12", 0x7400, 0},
+    {"timers34", 0x7500, 0}, {"irqstatus", 0x0A00, 0},
+    {"irqclear", 0x0B00, 0}, {NULL, 0, 0},
+};
+
+static const struct replay_signal hm2dpll_rates[] = {
+    {"timer1", REPLAY_OUTPUT, HM2_GTAG_DPLL, 0x83, 0}, {"timer2", REPLAY_OUTPUT, HM2_GTAG_DPLL, 0x84, 0},
+    {"timer3", REPLAY_OUTPUT, HM2_GTAG_DPLL, 0x85, 0}, {"timer4", REPLAY_OUTPUT, HM2_GTAG_DPLL, 0x86, 0},
+    {"ref", REPLAY_OUTPUT, HM2_GTAG_DPLL, 0x82, 0},
+};
+
+static const struct replay_signal hm2dpll_int[] = {
+    {"int", REPLAY_OUTPUT, HM2_GTAG_IRQ, 0x81, 0},
+};
+
+static const struct replay_vector hm2dpll_vectors[] = {
+    {"rates", hm2dpll_rates, 5, false},
+    {"int", hm2dpll_int, 1, false},
+    {NULL, NULL, 0, false},
+};
+
+/* ---- the kinds -----------------------------------------------------------------------------------------------------
+ */
+
+const struct replay_kind replay_kinds[] = {
+    {.folder = "stepgen",
+     .firmware = "SVST4_4_48",
+     .profile = "7i93",
+     .registers = stepgen_registers,
+     .signals = stepgen_signals},
+    {.folder = "encoder",
+     .firmware = "SVST8_4IM2_72",
+     .profile = "7i93",
+     .registers = encoder_registers,
+     .signals = encoder_signals},
+    {.folder = "encoder_muxed",
+     .firmware = "SV6_7I48_48",
+     .profile = "7i93",
+     .registers = muxed_registers,
+     .signals = muxed_signals,
+     .edges_end_early = true},
+    {.folder = "pwmgen",
+     .firmware = "SVST8_4IM2_72",
+     .profile = "7i93",
+     .registers = pwmgen_registers,
+     .signals = pwmgen_signals},
+    {.folder = "watchdog",
+     .firmware = "SVST4_4_48",
+     .profile = "7i93",
+     .registers = watchdog_registers,
+     .vectors = pad_vectors},
+    {.folder = "ioport", .firmware = "SVST4_4_48", .profile = "7i93", .vectors = ioport_vectors},
+    {.folder = "hm2dpll",
+     .firmware = "7I76E_51",
+     .profile = "7i93",
+     .registers = hm2dpll_registers,
+     .vectors = hm2dpll_vectors},
+};
+
+const unsigned replay_kind_count = sizeof(replay_kinds) / sizeof(replay_kinds[0]);
