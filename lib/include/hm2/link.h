@@ -33,7 +33,8 @@ struct link_ops {
     void (*close)(struct link *link); /* releases everything, the link itself included */
 };
 
-/* What a link counts by itself. Written by the link's thread (strangers: by its owner), read by anyone. */
+/* What a link counts by itself, written by the thread that uses the link; strangers by a thread of the link's own, so
+ * read it with link_strangers(). */
 struct link_counters {
     uint64_t sent, received;
     uint64_t send_errors;
@@ -68,15 +69,31 @@ static inline void link_close(struct link *const link)
         link->ops->close(link);
 }
 
+/* Datagrams of strangers so far; realtime and thread safe. */
+static inline uint64_t link_strangers(const struct link *const link)
+{
+    return __atomic_load_n(&link->counters.strangers, __ATOMIC_RELAXED);
+}
+
 /* ---- UDP ------------------------------------------------------------------------------------------------------- */
 
 struct link_udp_options {
     const char *address;   /* dotted IPv4 of the card, optionally ":port" (default LBP16's 27181) */
-    unsigned busy_poll_us; /* SO_BUSY_POLL; 0 = off */
+    unsigned busy_poll_us; /* SO_BUSY_POLL; 0 = off. Refused by the kernel = a warning in diag */
     bool watch_strangers;  /* count datagrams from others, in a thread that never touches the cyclic socket */
 };
 
-/* Open a connected socket: packets of strangers never reach recv(). Not realtime safe. On failure diag says why. */
+/* Open a connected socket: packets of strangers never reach recv(). Not realtime safe. On failure diag says why.
+ *
+ * Clock: CLOCK_MONOTONIC. System calls: send() is one send(2); recv() is one ppoll(2) and one recv(2) for a datagram
+ * that comes in time, one recv(2) alone when the deadline is over already.
+ *
+ * That nobody listens at the card's address (ICMP errors, no route) is not an error of the link: the datagram counts
+ * as lost and in send_errors or receive_errors, send() returns 0 and recv() goes on waiting; the card may come back.
+ *
+ * The watch is a second socket, bound to the same local address and port, which gets what the connected one does not
+ * match. Its thread runs with normal priority, blocks all signals, counts at most 64 datagrams a millisecond and ends
+ * at close. */
 HM2_API int HM2_MUST_CHECK link_udp_open(struct link **link, const struct link_udp_options *options,
                                          struct hm2_diag *diag);
 
@@ -89,28 +106,48 @@ struct link_mock_reply {
     int64_t delay_ns;
 };
 
-/* Called for every datagram sent; queues any number of replies with link_mock_push(). Returns 0 or the error that
- * send() shall return. */
+/* Called for every datagram sent; queues replies with link_mock_push(). Returns 0 or the error that send() shall
+ * return. */
 typedef int (*link_mock_handler)(void *context, struct link *mock, const uint8_t *data, size_t len);
 
 HM2_API int HM2_MUST_CHECK link_mock_open(struct link **link, link_mock_handler handler, void *context);
+/* Queue a datagram for recv(), from a handler or at any other time; the bytes are copied. Up to 64 can wait, of up to
+ * 2048 bytes each: HM2_ERR_NOSPACE. Equal arrival times keep their order. HM2_ERR_STATE for a link that is no mock. */
 HM2_API int HM2_MUST_CHECK link_mock_push(struct link *mock, const struct link_mock_reply *reply);
-HM2_API void link_mock_advance(struct link *mock, int64_t by_ns); /* virtual time passes */
+/* Virtual time passes. It starts at 0 and also passes in recv(): to the arrival of what it returns, or to the
+ * deadline. */
+HM2_API void link_mock_advance(struct link *mock, int64_t by_ns);
 
-/* A scripted mock: expects exactly these datagrams in this order. Text, one item a line: "> hex" is expected from
- * the client, "< hex" is the reply, "! lose" drops the next reply, "! dup" sends it twice, "! delay NS", "! cut N"
- * shortens it to N bytes, "! garble N" flips a bit of byte N, "! senderr" makes the next send fail. "#" comments. */
+/*
+ * A scripted mock: expects exactly these datagrams in this order. Text, one item a line; "#" begins a comment:
+ *   > HEX        expected from the client ("-" = a datagram without bytes; blanks between digits are ignored)
+ *   < HEX        the reply to it, at once; any number of them. Before the first ">": arrives unasked
+ *   ! lose       the next reply does not arrive
+ *   ! dup        the next reply arrives twice
+ *   ! delay NS   the next reply arrives so many nanoseconds after the request
+ *   ! cut N      the next reply is shortened to N bytes
+ *   ! garble N   one bit of byte N (from 0, after "! cut") of the next reply is wrong
+ *   ! senderr    the client's next send fails with HM2_ERR_IO, whatever it sends
+ * Faults add up; they end with the reply that they meet. After the first send that differs from the script, every
+ * send fails with HM2_ERR_MISMATCH. HM2_ERR_MALFORMED with the line number in diag for a script that is wrong.
+ */
 HM2_API int HM2_MUST_CHECK link_mock_script(struct link **link, const char *script, struct hm2_diag *diag);
-/* 0 when the script was followed to its end; otherwise diag tells line, expected and found. */
+/* 0 when the script (or the capture of a replay) was followed to its end; otherwise diag tells line, expected and
+ * found. Replies that nobody received are no fault. */
 HM2_API int link_mock_finish(struct link *mock, struct hm2_diag *diag);
 
 /* ---- record and replay ----------------------------------------------------------------------------------------- */
 
 /* Wrap a link: every datagram is written, with time and direction, to a text file (format: man page hm2capture(5)).
- * Writing happens in the calling thread: for diagnosis, not for production. Closing closes the inner link too. */
+ * Writing happens in the calling thread: for diagnosis, not for production. Closing closes the inner link too; when
+ * opening fails the inner link is still the caller's. */
 HM2_API int HM2_MUST_CHECK link_record_open(struct link **link, struct link *inner, const char *path,
                                             struct hm2_diag *diag);
-/* Answer from a capture file, in virtual time; a request that differs from the recorded one is HM2_ERR_MISMATCH. */
+/* Answer from a capture file (up to 256 MiB), in virtual time: a mock link, in which every reply follows its request
+ * after the recorded time. A request that differs from the recorded one, and all after it, are HM2_ERR_MISMATCH;
+ * link_mock_finish() tells where. HM2_ERR_MALFORMED with the line number in diag for a file that is no capture. */
 HM2_API int HM2_MUST_CHECK link_replay_open(struct link **link, const char *path, struct hm2_diag *diag);
+/* The same from memory; text need not be terminated and is not needed afterwards. */
+HM2_API int HM2_MUST_CHECK link_replay_text(struct link **link, const char *text, size_t len, struct hm2_diag *diag);
 
 #endif

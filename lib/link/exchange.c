@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "exchange.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Room for `needed` elements of `size` bytes, doubling; both are bounded by the length of the text they come from. */
+static void *grown(void *const memory, size_t *const capacity, const size_t needed, const size_t size)
+{
+    if (needed <= *capacity)
+        return memory;
+    const size_t room = needed < 64 ? 64 : 2 * needed;
+    void *const larger = realloc(memory, room * size);
+    if (larger)
+        *capacity = room;
+    return larger;
+}
+
+int exchange_add(struct exchange *const exchange, const struct exchange_item *const item, const uint8_t *const bytes)
+{
+    struct exchange_item *const items =
+        grown(exchange->items, &exchange->item_capacity, exchange->count + 1, sizeof items[0]);
+    if (!items)
+        return HM2_ERR_NOMEM;
+    exchange->items = items;
+    uint8_t *const all = grown(exchange->bytes, &exchange->byte_capacity, exchange->used + item->len + 1, 1);
+    if (!all)
+        return HM2_ERR_NOMEM;
+    exchange->bytes = all;
+    if (item->len > 0)
+        memcpy(all + exchange->used, bytes, item->len);
+    items[exchange->count] = *item;
+    items[exchange->count].at = exchange->used;
+    exchange->count++;
+    exchange->used += item->len;
+    return 0;
+}
+
+void exchange_free(struct exchange *const exchange)
+{
+    free(exchange->items);
+    free(exchange->bytes);
+    *exchange = (struct exchange){0};
+}
