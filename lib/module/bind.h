@@ -10,6 +10,11 @@
 int HM2_MUST_CHECK hm2_bind_group(const struct hm2_setup *setup, const struct hm2_point_group *group, void *base,
                                   unsigned index);
 
+/* The same where the names of the rows have an index of their own ("ssr.##" with "out-##"): unit goes into the prefix,
+ * item into the names. */
+int HM2_MUST_CHECK hm2_bind_item(const struct hm2_setup *setup, const struct hm2_point_group *group, void *base,
+                                 unsigned unit, unsigned item);
+
 /* Zeroed memory from the host, or NULL with the reason in the set-up's diag. */
 void *hm2_setup_alloc(const struct hm2_setup *setup, size_t size);
 

@@ -40,6 +40,7 @@ enum hm2_notice {
     HM2_NOTICE_TIMEOUT_SHORT,  /* watchdog time-out below 1.5 periods */
     HM2_NOTICE_TABLE_TOO_LONG, /* step table longer than 16 or wider than the pins */
     HM2_NOTICE_HEADROOM,       /* command needs more than maxvel/maxaccel allow */
+    HM2_NOTICE_DUMP_STATE,     /* a person asked for a listing of all modules (raw.dump_state) */
     HM2_NOTICES
 };
 
@@ -131,7 +132,9 @@ HM2_API int HM2_MUST_CHECK hm2_claim_pins(const struct hm2_module *module, struc
                                           unsigned units, bool immediate,
                                           bool (*filter)(const struct hm2_pd *pd, const struct hm2_setup *setup));
 
-/* Every module type this library knows, in the order in which they are unpacked and packed; NULL-terminated. */
+/* Every module type this library knows, in the order in which a board sets them up, unpacks and packs them. Ports come
+ * behind all types that claim pins, because they offer as GPIO what nobody claimed. A type whose gtag is HM2_GTAG_NONE
+ * has no descriptor: its setup is called once per board, with md NULL and instances 1. NULL-terminated. */
 HM2_API extern const struct hm2_module_type *const hm2_module_types[];
 
 #endif

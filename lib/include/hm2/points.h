@@ -34,7 +34,8 @@ enum hm2_point_dir {
 };
 
 struct hm2_point {
-    const char *name; /* suffix below its prefix; "##" stands for a two-digit index, "###" for three */
+    const char
+        *name; /* suffix below its prefix; "##" stands for an index of two digits, "###" for three, "#" for one */
     enum hm2_point_type type;
     enum hm2_point_dir dir;
     double initial;   /* value after creation; bits and integers are converted */
@@ -70,7 +71,8 @@ HM2_API void hm2_point_store(enum hm2_point_type type, void *value, double numbe
 HM2_API double hm2_point_load(enum hm2_point_type type, const void *value);
 
 /* Create every row of a table for the struct at base (which must lie in memory from the binder's alloc). Full name =
- * prefix "." name. index replaces every "##" or "###" in names, zero padded. Stores the initial values. Stops at the
+ * prefix "." name. index replaces every run of "#" in names, zero padded
+ * to its length. Stores the initial values. Stops at the
  * first failure: HM2_ERR_NOSPACE for a full name of HM2_NAME_SIZE or more characters, else what the binder returned. */
 HM2_API int HM2_MUST_CHECK hm2_bind_points(struct hm2_binder *binder, const struct hm2_point *points, size_t count,
                                            void *base, const char *prefix, unsigned index, struct hm2_diag *diag);
