@@ -192,12 +192,25 @@ static const struct sim_module_ops *model_for(const uint8_t gtag)
     return NULL;
 }
 
-static void claim_pages(struct sim_card *const card, struct sim_module *const m)
+static void claim_pages(struct sim_card *const card, struct sim_module *const m, const unsigned pages)
 {
     const unsigned first = m->md.base >> PAGE_SHIFT;
-    for (unsigned i = 0; i < m->ops->pages && first + i < SIM_PAGES; i++)
+    for (unsigned i = 0; i < pages && first + i < SIM_PAGES; i++)
         if (!card->page_owner[first + i])
             card->page_owner[first + i] = m;
+}
+
+/* What a descriptor declares goes first: in the old map other modules lie where the registers that a newer module has
+ * beyond its descriptor would be (WaveGen at the step generators' select register, for one; register map 2.2). */
+static void claim_all_pages(struct sim_card *const card)
+{
+    for (unsigned i = 0; i < card->module_count; i++) {
+        struct sim_module *const m = &card->modules[i];
+        const unsigned declared = m->md.registers < m->ops->pages ? m->md.registers : m->ops->pages;
+        claim_pages(card, m, declared);
+    }
+    for (unsigned i = 0; i < card->module_count; i++)
+        claim_pages(card, &card->modules[i], card->modules[i].ops->pages);
 }
 
 static int add_module(struct sim_card *const card, const struct hm2_md *const md, struct hm2_diag *const diag)
@@ -219,10 +232,20 @@ static int add_module(struct sim_card *const card, const struct hm2_md *const md
     if (err)
         return hm2_diag_add(diag, err, "the simulated %s module refuses its descriptor (%u instances at 0x%04X): %s",
                             ops->name, md->instances, md->base, hm2_strerror(err));
-    claim_pages(card, m);
     if (md->gtag == HM2_GTAG_IOPORT && !card->ioport)
         card->ioport = m;
     return 0;
+}
+
+/* The interrupt logic of cards with a DPLL answers whether or not a descriptor tells of it (the hm2dpll traces). */
+static int add_hidden_modules(struct sim_card *const card, struct hm2_diag *const diag)
+{
+    static const struct hm2_md irq = {
+        .gtag = HM2_GTAG_IRQ, .clock_tag = 1, .instances = 1, .base = 0x0900, .registers = 3};
+    if (!sim_module_of(card, HM2_GTAG_DPLL) || sim_module_of(card, HM2_GTAG_IRQ) ||
+        card->module_count >= HM2_MAX_MODULES)
+        return 0;
+    return add_module(card, &irq, diag);
 }
 
 static void power_up(struct sim_card *const card)
@@ -263,6 +286,10 @@ static int build(struct sim_card *const card, const struct sim_card_options *con
         if (err)
             return err;
     }
+    const int err = add_hidden_modules(card, diag);
+    if (err)
+        return err;
+    claim_all_pages(card);
     for (unsigned io = 0; io < HM2_MAX_PINS; io++)
         card->pads[io].outside = SIM_PULLUP;
     power_up(card);

@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* StepGen (register map 3.4): registers and time of the step generators behind one descriptor. */
+#include "dpll.h"
+#include "map.h"
+#include "sim_card.h"
+#include "stepgen_logic.h"
+
+#define INSTANCES_MAX 64u /* address bits 7..2 select the instance (1.1) */
+#define PAGES         11u /* registers 0..9, and 10 in the new map */
+
+enum {
+    REG_ACCUM = SIM_STEPGEN_ACCUM,
+    REG_MASTER_DDS = SIM_STEPGEN_REGS, /* the first one that all instances share */
+    REG_DPLL_SELECT
+};
+
+#define DPLL_SELECT_ENABLE 0x8000u /* [15] enable, [14:12] timer; the rest is not stored */
+#define DPLL_SELECT_MASK   0xF000u
+
+#define MODE_BITS_PLAIN 0x3u
+#define MODE_BIT_SWAP   0x4u /* versions 0x42 and 0xC2 swap the two outputs */
+
+struct instance {
+    struct sim_stepgen gen;
+    uint32_t latched; /* new map: what register 1 reads */
+};
+
+struct stepgens {
+    struct sim_rategen rategen;
+    bool has_dpll_select;
+    uint8_t mode_bits;
+    unsigned count;
+    uint16_t dpll_select;
+    /* The edge after a write to the select register compares the newly chosen timer with what the old one was. */
+    int64_t switched_clk;
+    bool switch_latches;
+    struct instance instances[INSTANCES_MAX];
+};
+
+static int init(struct sim_module *const m)
+{
+    struct stepgens *const s = m->state;
+    const struct hm2_idrom *const idrom = sim_idrom(m->card);
+    s->count = m->md.instances < INSTANCES_MAX ? m->md.instances : INSTANCES_MAX;
+    s->has_dpll_select = sim_map_is_new(idrom) && hm2_idrom_find(idrom, HM2_GTAG_DPLL);
+    s->mode_bits = MODE_BITS_PLAIN;
+    if (m->md.version == 0x42 || m->md.version == 0xC2)
+        s->mode_bits |= MODE_BIT_SWAP;
+    return 0;
+}
+
+static void power_up(struct sim_module *const m)
+{
+    struct stepgens *const s = m->state;
+    s->rategen = (struct sim_rategen){0};
+    s->dpll_select = 0;
+    s->switched_clk = INT64_MIN;
+    for (unsigned i = 0; i < s->count; i++)
+        s->instances[i] = (struct instance){0};
+}
+
+/* ---- time ---------------------------------------------------------------------------------------------------------
+ */
+
+static void run(struct stepgens *const s, const int64_t edges)
+{
+    for (unsigned i = 0; i < s->count; i++)
+        sim_stepgen_run(&s->instances[i].gen, &s->rategen, edges);
+    for (int64_t done = 0; done < edges; done += SIM_STEPGEN_HORIZON)
+        sim_rategen_run(&s->rategen, edges - done < SIM_STEPGEN_HORIZON ? edges - done : SIM_STEPGEN_HORIZON);
+}
+
+/* What register 1 reads is a register of its own, loaded at an edge with the accumulator from before that edge. */
+static void latch(struct stepgens *const s)
+{
+    for (unsigned i = 0; i < s->count; i++)
+        s->instances[i].latched = (uint32_t)(s->instances[i].gen.accum >> 16);
+}
+
+static unsigned selected_timer(const struct stepgens *const s)
+{
+    const unsigned timer = s->dpll_select >> 12 & 7u;
+    return timer <= 4 ? timer : 0;
+}
+
+/* The edge in [from, to) that is the last to load the read-back, -1 = none. */
+static int64_t last_latch(struct sim_module *const m, const int64_t from, const int64_t to)
+{
+    const struct stepgens *const s = m->state;
+    if (!(s->dpll_select & DPLL_SELECT_ENABLE))
+        return to - 1;
+    /* The edge after the one that made the timer rise. */
+    const int64_t rise = sim_dpll_last_rise(m->card, selected_timer(s), to - 1);
+    const int64_t first = from == s->switched_clk ? from + 1 : from;
+    if (rise >= first - 1)
+        return rise + 1;
+    return first > from && s->switch_latches ? from : -1;
+}
+
+static void select_timer(struct sim_module *const m, const uint32_t value)
+{
+    struct stepgens *const s = m->state;
+    const bool was_high = sim_dpll_level(m->card, selected_timer(s), m->clk - 1);
+    s->dpll_select = value & DPLL_SELECT_MASK;
+    s->switched_clk = m->clk;
+    s->switch_latches = !was_high && sim_dpll_level(m->card, selected_timer(s), m->clk);
+}
+
+static void advance(struct sim_module *const m, const int64_t clk)
+{
+    struct stepgens *const s = m->state;
+    int64_t from = m->clk;
+    const int64_t at = s->has_dpll_select ? last_latch(m, from, clk) : -1;
+    if (at >= from) {
+        run(s, at - from);
+        latch(s);
+        from = at;
+    }
+    run(s, clk - from);
+}
+
+static int64_t next_event(struct sim_module *const m)
+{
+    const struct stepgens *const s = m->state;
+    int64_t silent = SIM_STEPGEN_HORIZON;
+    for (unsigned i = 0; i < s->count; i++) {
+        const int64_t own = sim_stepgen_silent(&s->instances[i].gen, &s->rategen);
+        if (own < silent)
+            silent = own;
+    }
+    return m->clk + silent;
+}
+
+/* ---- registers ----------------------------------------------------------------------------------------------------
+ */
+
+static uint32_t read_reg(struct sim_module *const m, const unsigned page, const unsigned low, uint32_t *const undriven)
+{
+    const struct stepgens *const s = m->state;
+    const unsigned i = low / 4;
+    if (page == REG_MASTER_DDS)
+        return s->rategen.rate;
+    if (page == REG_DPLL_SELECT && s->has_dpll_select)
+        return s->dpll_select;
+    if (page == REG_ACCUM && i < s->count)
+        return s->has_dpll_select ? s->instances[i].latched : (uint32_t)(s->instances[i].gen.accum >> 16);
+    *undriven = UINT32_MAX; /* all others are write-only (trace readback) */
+    return 0;
+}
+
+/* The edge at which something is written; every generator makes it, one perhaps with a new register value. */
+static void edge(struct sim_module *const m, const unsigned chosen, const struct sim_stepgen_write *const write)
+{
+    struct stepgens *const s = m->state;
+    if (s->has_dpll_select && last_latch(m, m->clk, m->clk + 1) == m->clk)
+        latch(s);
+    for (unsigned i = 0; i < s->count; i++)
+        sim_stepgen_edge(&s->instances[i].gen, s->rategen.tick, i == chosen ? write : NULL);
+    m->clk++;
+}
+
+static void write_reg(struct sim_module *const m, const unsigned page, const unsigned low, const uint32_t value)
+{
+    struct stepgens *const s = m->state;
+    struct sim_stepgen_write write = {.reg = SIM_STEPGEN_REGS, .value = value};
+    if (page < SIM_STEPGEN_REGS)
+        write.reg = (enum sim_stepgen_reg)page;
+    if (write.reg == SIM_STEPGEN_MODE)
+        write.value &= s->mode_bits;
+    edge(m, low / 4, &write);
+    if (page == REG_MASTER_DDS)
+        sim_rategen_load(&s->rategen, value);
+    else
+        sim_rategen_run(&s->rategen, 1);
+    if (page == REG_DPLL_SELECT && s->has_dpll_select)
+        select_timer(m, value);
+}
+
+/* ---- outputs ------------------------------------------------------------------------------------------------------
+ */
+
+static enum sim_level output(struct sim_module *const m, const unsigned unit, const uint8_t secondary_pin)
+{
+    const struct stepgens *const s = m->state;
+    const unsigned number = (secondary_pin & 0x7Fu) - 1; /* 0x81 = step or table bit 0, 0x82 = dir or bit 1, ... */
+    if (unit >= s->count || number >= 8)
+        return SIM_LOW;
+    const struct sim_stepgen *const gen = &s->instances[unit].gen;
+    unsigned outputs = sim_stepgen_outputs(gen);
+    if (gen->mode & MODE_BIT_SWAP)
+        outputs = (outputs & ~3u) | (outputs & 1u) << 1 | (outputs >> 1 & 1u);
+    return outputs >> number & 1u ? SIM_HIGH : SIM_LOW;
+}
+
+int64_t sim_stepgen_position(struct sim_card *const card, const unsigned stepgen)
+{
+    const struct sim_module *const m = sim_find(card, HM2_GTAG_STEPGEN);
+    if (!m)
+        return 0;
+    const struct stepgens *const s = m->state;
+    return stepgen < s->count ? s->instances[stepgen].gen.travel : 0;
+}
+
+const struct sim_module_ops sim_stepgen_ops = {
+    .gtag = HM2_GTAG_STEPGEN,
+    .name = "StepGen",
+    .pages = PAGES,
+    .state_size = sizeof(struct stepgens),
+    .init = init,
+    .power_up = power_up,
+    .advance = advance,
+    .read = read_reg,
+    .write = write_reg,
+    .output = output,
+    .next_event = next_event,
+};

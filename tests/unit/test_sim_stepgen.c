@@ -1,0 +1,189 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "unit.h"
+
+#include "random.h"
+#include "stepgen_logic.h"
+#include "trace_folder.h"
+
+static void every_recorded_read_and_edge_is_matched(void **state)
+{
+    (void)state;
+    const struct replay_totals totals = replay_data("stepgen");
+    assert_int_equal(totals.failed, 0);
+    assert_int_equal(totals.passed, 43);
+}
+
+/* ---- closed form against clock by clock ---------------------------------------------------------------------------
+ */
+
+struct pair {
+    struct sim_rategen fast_rate, slow_rate;
+    struct sim_stepgen fast, slow;
+};
+
+static void assert_same(const struct pair *const p, const unsigned seed)
+{
+    if (p->fast.accum == p->slow.accum && p->fast.travel == p->slow.travel &&
+        sim_stepgen_outputs(&p->fast) == sim_stepgen_outputs(&p->slow) && p->fast.table_ptr == p->slow.table_ptr &&
+        p->fast_rate.accum == p->slow_rate.accum)
+        return;
+    fail_msg("seed %u: accum %012llX, clock by clock %012llX; outputs %02X, %02X; table %u, %u", seed,
+             (unsigned long long)p->fast.accum, (unsigned long long)p->slow.accum, sim_stepgen_outputs(&p->fast),
+             sim_stepgen_outputs(&p->slow), p->fast.table_ptr, p->slow.table_ptr);
+}
+
+static void run_both(struct pair *const p, const int64_t edges, const unsigned seed)
+{
+    sim_stepgen_run(&p->fast, &p->fast_rate, edges);
+    sim_rategen_run(&p->fast_rate, edges);
+    const int64_t silent = sim_stepgen_silent(&p->slow, &p->slow_rate);
+    const unsigned outputs = sim_stepgen_outputs(&p->slow);
+    for (int64_t i = 0; i < edges; i++) {
+        sim_stepgen_edge(&p->slow, p->slow_rate.tick, NULL);
+        sim_rategen_run(&p->slow_rate, 1);
+        if (i < silent && sim_stepgen_outputs(&p->slow) != outputs)
+            fail_msg("seed %u: an output changed at edge %lld, %lld were to be silent", seed, (long long)i,
+                     (long long)silent);
+    }
+    assert_same(p, seed);
+}
+
+static void write_both(struct pair *const p, const enum sim_stepgen_reg reg, const uint32_t value)
+{
+    const struct sim_stepgen_write write = {.reg = reg, .value = value};
+    sim_stepgen_edge(&p->fast, p->fast_rate.tick, &write);
+    sim_stepgen_edge(&p->slow, p->slow_rate.tick, &write);
+    sim_rategen_run(&p->fast_rate, 1);
+    sim_rategen_run(&p->slow_rate, 1);
+}
+
+static void write_basic_rate_both(struct pair *const p, const uint32_t value)
+{
+    sim_stepgen_edge(&p->fast, p->fast_rate.tick, NULL);
+    sim_stepgen_edge(&p->slow, p->slow_rate.tick, NULL);
+    sim_rategen_load(&p->fast_rate, value);
+    sim_rategen_load(&p->slow_rate, value);
+}
+
+static uint32_t random_rate(struct random *const r)
+{
+    const uint32_t size = random_below(r, 3) == 0 ? random_magnitude(r) : 0x7FFFFFFFu >> random_below(r, 14);
+    return random_below(r, 2) ? size - random_below(r, 5) : 0u - size + random_below(r, 5);
+}
+
+static uint32_t random_value(struct random *const r, const enum sim_stepgen_reg reg)
+{
+    switch (reg) {
+    case SIM_STEPGEN_RATE:
+        return random_rate(r);
+    case SIM_STEPGEN_DIR_SETUP:
+    case SIM_STEPGEN_DIR_HOLD:
+    case SIM_STEPGEN_PULSE_ACTIVE:
+    case SIM_STEPGEN_PULSE_IDLE:
+        return random_below(r, 4) ? random_below(r, 30) : (uint32_t)random_u64(r) >> random_below(r, 31);
+    case SIM_STEPGEN_ACCUM:
+    case SIM_STEPGEN_MODE:
+    case SIM_STEPGEN_TABLE:
+    case SIM_STEPGEN_TABLE_MAX:
+    case SIM_STEPGEN_REGS:
+        break;
+    }
+    return (uint32_t)random_u64(r);
+}
+
+static void random_write(struct pair *const p, struct random *const r)
+{
+    const uint32_t basic = random_below(r, 2) ? 0xFFFFFFFFu : random_below(r, 2) ? 0x80000000u : random_magnitude(r);
+    if (random_below(r, 10) == 0)
+        write_basic_rate_both(p, basic);
+    else if (random_below(r, 2))
+        write_both(p, SIM_STEPGEN_RATE, random_rate(r));
+    else {
+        const enum sim_stepgen_reg reg = (enum sim_stepgen_reg)random_below(r, SIM_STEPGEN_REGS);
+        write_both(p, reg, random_value(r, reg));
+    }
+}
+
+static void any_run_in_closed_form_equals_the_same_run_clock_by_clock(void **state)
+{
+    (void)state;
+    for (unsigned seed = 0; seed < 4000; seed++) {
+        struct random r = {seed};
+        struct pair p = {0};
+        write_basic_rate_both(&p, random_below(&r, 4) ? 0xFFFFFFFFu : random_magnitude(&r));
+        for (enum sim_stepgen_reg reg = SIM_STEPGEN_RATE; reg < SIM_STEPGEN_REGS; reg++)
+            write_both(&p, reg, random_value(&r, reg));
+        for (unsigned i = 0; i < 12; i++) {
+            run_both(&p, 1 + random_below(&r, 1u << random_below(&r, 12)), seed);
+            random_write(&p, &r);
+        }
+    }
+}
+
+/* The DDS leaves out one tick in 2^32 - rate; start just before such a place, at full speed and held by the timers. */
+static void a_tick_that_the_master_dds_leaves_out_is_left_out_in_closed_form_too(void **state)
+{
+    (void)state;
+    for (unsigned seed = 0; seed < 300; seed++) {
+        struct random r = {seed};
+        struct pair p = {.slow_rate = {.accum = random_below(&r, 3000),
+                                       .rate = 0xFFFFFFFFu - random_below(&r, 3),
+                                       .old_msb = true,
+                                       .tick = true}};
+        p.fast_rate = p.slow_rate;
+        write_both(&p, SIM_STEPGEN_PULSE_ACTIVE, random_below(&r, 5));
+        write_both(&p, SIM_STEPGEN_PULSE_IDLE, random_below(&r, 5));
+        write_both(&p, SIM_STEPGEN_RATE, random_rate(&r));
+        run_both(&p, 2000 + random_below(&r, 3000), seed);
+        run_both(&p, 1 + random_below(&r, 30), seed);
+    }
+}
+
+/* ---- cost ---------------------------------------------------------------------------------------------------------
+ */
+
+/* A second of ten million steps; clock by clock this loop would take minutes. */
+static void a_second_at_ten_million_steps_costs_nearly_nothing(void **state)
+{
+    (void)state;
+    struct pair p = {0};
+    write_basic_rate_both(&p, 0xFFFFFFFFu);
+    write_both(&p, SIM_STEPGEN_PULSE_ACTIVE, 3);
+    write_both(&p, SIM_STEPGEN_PULSE_IDLE, 2);
+    write_both(&p, SIM_STEPGEN_RATE, 0x19999999); /* 0.1 steps a clock; the timers allow a step in 9 clocks */
+    const uint64_t before = p.fast.accum;
+    for (int second = 0; second < 100; second++) {
+        sim_stepgen_run(&p.fast, &p.fast_rate, 100000000);
+        sim_rategen_run(&p.fast_rate, 100000000);
+    }
+    assert_true(p.fast.accum != before);
+    assert_true(p.fast.travel >> 32 > 999999800 && p.fast.travel >> 32 < 1000000000);
+}
+
+static void a_saturated_second_keeps_the_period_of_the_timers(void **state)
+{
+    (void)state;
+    struct pair p = {0};
+    write_basic_rate_both(&p, 0xFFFFFFFFu);
+    write_both(&p, SIM_STEPGEN_PULSE_ACTIVE, 5);
+    write_both(&p, SIM_STEPGEN_PULSE_IDLE, 10);
+    write_both(&p, SIM_STEPGEN_RATE, 0x7FFFFFFF);
+    for (int second = 0; second < 100; second++) {
+        sim_stepgen_run(&p.fast, &p.fast_rate, 100000000);
+        sim_rategen_run(&p.fast_rate, 100000000);
+    }
+    const int64_t steps = p.fast.travel >> 32;
+    assert_true(steps >= 10000000000 / 19 - 30 && steps <= 10000000000 / 19 + 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_recorded_read_and_edge_is_matched),
+        cmocka_unit_test(any_run_in_closed_form_equals_the_same_run_clock_by_clock),
+        cmocka_unit_test(a_tick_that_the_master_dds_leaves_out_is_left_out_in_closed_form_too),
+        cmocka_unit_test(a_second_at_ten_million_steps_costs_nearly_nothing),
+        cmocka_unit_test(a_saturated_second_keeps_the_period_of_the_timers),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
