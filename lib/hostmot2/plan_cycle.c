@@ -34,18 +34,34 @@ static bool is_empty(const struct plan_set *const set)
     return any == 0;
 }
 
+/* The card has other words than these now. On demand: not confirmed any longer, but nobody asked to send them either.
+ */
+static void changed(const struct hm2_section *const section)
+{
+    struct hm2_plan *const plan = section->plan;
+    const unsigned number = section->number;
+    if (!plan->sections[number].on_demand)
+        move(plan, number, PLAN_DIRTY);
+    else
+        plan->in_state[PLAN_CLEAN].bits[number / 64u] &= ~(UINT64_C(1) << number % 64u);
+}
+
 void hm2_section_set(struct hm2_section *const section, const unsigned word, const uint32_t value)
 {
     uint8_t *const at = section->bytes + 4u * word;
     if (hm2_get_le32(at) == value)
         return;
     hm2_put_le32(at, value);
-    struct hm2_plan *const plan = section->plan;
-    const unsigned number = section->number;
-    if (!plan->sections[number].on_demand)
-        move(plan, number, PLAN_DIRTY);
-    else if (in_state(plan, number, PLAN_CLEAN)) /* the card has other words: confirmed no longer */
-        plan->in_state[PLAN_CLEAN].bits[number / 64u] &= ~(UINT64_C(1) << number % 64u);
+    changed(section);
+}
+
+void hm2_section_move(struct hm2_section *const section, const uint16_t address)
+{
+    uint8_t *const field = section->bytes - PLAN_ADDRESS_BYTES;
+    if (hm2_get_le16(field) == address)
+        return;
+    hm2_put_le16(field, address);
+    changed(section);
 }
 
 uint32_t hm2_section_get(const struct hm2_section *const section, const unsigned word)
@@ -121,13 +137,15 @@ static void settle_sections(struct hm2_plan *const plan, const uint32_t shown)
 {
     for (unsigned i = 0; i < plan->section_count; i++) {
         const struct plan_section *const entry = &plan->sections[i];
-        const bool later_than_request = hm2_delta32(entry->write_seq, plan->write_at_request) > 0;
-        if (in_state(plan, i, PLAN_FLYING) && entry->write_seq == shown)
+        const bool flying = in_state(plan, i, PLAN_FLYING);
+        const bool lost = flying && hm2_delta32(entry->write_seq, plan->write_at_request) <= 0;
+        /* An older write came after it and may have undone it. */
+        const bool undone =
+            in_state(plan, i, PLAN_CLEAN) && !entry->on_demand && hm2_delta32(entry->write_seq, shown) > 0;
+        if (flying && entry->write_seq == shown)
             move(plan, i, PLAN_CLEAN);
-        else if (in_state(plan, i, PLAN_FLYING) && !later_than_request)
+        else if (lost || undone)
             move(plan, i, PLAN_DIRTY);
-        else if (in_state(plan, i, PLAN_CLEAN) && hm2_delta32(entry->write_seq, shown) > 0 && !entry->on_demand)
-            move(plan, i, PLAN_DIRTY); /* an older write came after it and may have undone it */
     }
 }
 

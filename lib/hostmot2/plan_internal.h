@@ -28,6 +28,7 @@ enum {
 /* Commands of our own: word, address and data. */
 enum {
     PLAN_COMMAND_BYTES = 4,         /* word and address of any command */
+    PLAN_ADDRESS_BYTES = 2,         /* in front of the data of a write */
     PLAN_NUMBER_BYTES = 8,          /* write of one number */
     PLAN_SESSION_BYTES = 6 + 8,     /* HM2Timeout = 0, session number */
     PLAN_REQUEST_BYTES = 8 + 2 * 4, /* write of the sequence number and the two reads of the trailer */

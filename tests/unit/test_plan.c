@@ -691,6 +691,33 @@ static void a_fifo_section_writes_all_words_to_one_address(void **state)
     assert_int_equal(card_word(fixture, 0x2004), 0);
 }
 
+static void a_section_can_move_to_another_address(void **state)
+{
+    struct fixture *const fixture = *state;
+    struct hm2_section plain, demand;
+    assert_int_equal(hm2_plan_add_setup(fixture->plan, &plain, HM2_RANK_NORMAL, 0x2000, 1, 0, NULL), 0);
+    assert_int_equal(
+        hm2_plan_add_setup(fixture->plan, &demand, HM2_RANK_NORMAL, 0x2000, 1, HM2_SECTION_ON_DEMAND, NULL), 0);
+    freeze(fixture);
+    hm2_section_set(&plain, 0, 3);
+    hm2_section_set(&demand, 0, 4);
+    hm2_section_touch(&demand);
+    (void)write_cycle(fixture, true);
+    read_cycle(fixture);
+    hm2_section_move(&plain, 0x2000); /* no change */
+    assert_true(hm2_section_confirmed(&plain));
+    hm2_section_move(&plain, 0x3000);
+    hm2_section_move(&demand, 0x4000);
+    assert_false(hm2_section_confirmed(&plain));
+    assert_false(hm2_section_confirmed(&demand));
+    assert_int_equal(write_cycle(fixture, true), QUIET_WRITE + 8);
+    assert_int_equal(card_word(fixture, 0x3000), 3);
+    assert_int_equal(card_word(fixture, 0x4000), 0);
+    hm2_section_touch(&demand);
+    assert_int_equal(write_cycle(fixture, true), QUIET_WRITE + 8);
+    assert_int_equal(card_word(fixture, 0x4000), 4);
+}
+
 /* ---- session ----------------------------------------------------------------------------------------------------- */
 
 static void the_session_is_sent_until_shown_and_again_after_touch_all(void **state)
@@ -835,6 +862,7 @@ int main(void)
         CASE(sections_travel_by_rank_and_split_over_writes_in_order),
         CASE(a_section_on_demand_waits_for_its_touch),
         CASE(a_fifo_section_writes_all_words_to_one_address),
+        CASE(a_section_can_move_to_another_address),
         CASE(the_session_is_sent_until_shown_and_again_after_touch_all),
         CASE(a_card_that_lost_its_power_is_noticed_and_set_up_again),
         CASE(session_numbers_that_an_empty_card_may_show_are_not_used),

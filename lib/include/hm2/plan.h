@@ -119,6 +119,9 @@ HM2_API void hm2_section_set(struct hm2_section *section, unsigned word, uint32_
 HM2_API uint32_t hm2_section_get(const struct hm2_section *section, unsigned word);
 /* Send it with the next write, changed or not. */
 HM2_API void hm2_section_touch(struct hm2_section *section);
+/* Give the section another address (its words count as changed): for registers that a person chooses. The card
+ * ignores the lowest two bits. */
+HM2_API void hm2_section_move(struct hm2_section *section, uint16_t address);
 /* True when the card has confirmed that it received the words as they stand. */
 HM2_API bool hm2_section_confirmed(const struct hm2_section *section);
 /* Everything again, the session number included: the card lost its state or a person cleared a fault. Sections on
