@@ -48,6 +48,29 @@ void replay_report(const struct replay_options *const options, struct replay_tot
         options->on_result(options->context, test, passed, difference);
 }
 
+/* A test whose recording lacks its inputs: play it with those that the rest of it tells. */
+static int play_completed(struct replay_run *const run, struct hm2_diag *const diag)
+{
+    struct replay_event_list list = {0};
+    struct replay_trace merged;
+    int err = run->kind->make_inputs(run->trace, run->test, &list);
+    if (!err)
+        err = replay_trace_merge(&merged, run->trace, run->test, &list);
+    if (err) {
+        free(list.events);
+        return hm2_diag_add(diag, err, "No memory for the inputs of test %s.", run->test->name);
+    }
+    const struct replay_test test = {
+        .name = run->test->name, .description = run->test->description, .count = list.count};
+    run->trace = &merged;
+    run->test = &test;
+    err = replay_play(run, diag);
+    run->trace = NULL;
+    run->test = NULL;
+    free(list.events);
+    return err;
+}
+
 static int play_trace(const struct replay_kind *const kind, const struct replay_trace *const trace,
                       const struct replay_options *const options, struct replay_totals *const totals,
                       struct hm2_diag *const diag)
@@ -57,15 +80,16 @@ static int play_trace(const struct replay_kind *const kind, const struct replay_
         return hm2_diag_add(diag, HM2_ERR_NOMEM, "No memory for a replay.");
     int err = 0;
     for (size_t i = 0; i < trace->test_count && !err; i++) {
-        if (!replay_wanted(options, trace->tests[i].name))
+        const struct replay_test *const test = &trace->tests[i];
+        if (!replay_wanted(options, test->name))
             continue;
         memset(run, 0, sizeof(*run));
         run->kind = kind;
         run->trace = trace;
-        run->test = &trace->tests[i];
-        err = replay_play(run, diag);
+        run->test = test;
+        err = kind->make_inputs ? play_completed(run, diag) : replay_play(run, diag);
         if (!err)
-            replay_report(options, totals, run->test->name, run->difference);
+            replay_report(options, totals, test->name, run->difference);
     }
     free(run);
     return err;

@@ -30,7 +30,12 @@ static const struct replay_register muxed_registers[] = {
     {"timestamp", 0x3800, 0}, {"filterrate", 0x3900, 0}, {NULL, 0, 0},
 };
 
+/* Inputs are those of an encoder behind a multiplexer without delay, as the recording bench had it. */
 static const struct replay_signal muxed_signals[] = {
+    {"A", REPLAY_INPUT, HM2_GTAG_MUXED_ENCODER, 0x41, 0},
+    {"B", REPLAY_INPUT, HM2_GTAG_MUXED_ENCODER, 0x42, 0},
+    {"index", REPLAY_INPUT, HM2_GTAG_MUXED_ENCODER, 0x43, 0},
+    {"mask", REPLAY_INPUT, HM2_GTAG_MUXED_ENCODER, 0x04, 0},
     {"select", REPLAY_OUTPUT, HM2_GTAG_MUXED_ENCODER_SEL, 0x81, 0},
     {NULL, REPLAY_PAD, 0, 0, 0},
 };
@@ -149,6 +154,22 @@ static const struct replay_vector hm2dpll_vectors[] = {
     {NULL, NULL, 0, false},
 };
 
+/* ---- before a test
+ * ---------------------------------------------------------------------------------------------------- */
+
+/* The bench of the counter recordings held its inputs low; a pad left alone would be pulled up. */
+static int inputs_low(struct replay_run *const run)
+{
+    for (const struct replay_signal *s = run->kind->signals; s->name; s++) {
+        for (unsigned unit = 0; s->kind == REPLAY_INPUT && unit < 8; unit++) {
+            const int err = sim_card_drive_input(run->card, -1, s->gtag, unit, s->secondary_pin, SIM_LOW);
+            if (err)
+                return err;
+        }
+    }
+    return 0;
+}
+
 /* ---- the kinds -----------------------------------------------------------------------------------------------------
  */
 
@@ -162,12 +183,15 @@ const struct replay_kind replay_kinds[] = {
      .firmware = "SVST8_4IM2_72",
      .profile = "7i93",
      .registers = encoder_registers,
-     .signals = encoder_signals},
+     .signals = encoder_signals,
+     .prepare = inputs_low},
     {.folder = "encoder_muxed",
      .firmware = "SV6_7I48_48",
      .profile = "7i93",
      .registers = muxed_registers,
      .signals = muxed_signals,
+     .prepare = inputs_low,
+     .make_inputs = replay_muxed_inputs,
      .edges_end_early = true},
     {.folder = "pwmgen",
      .firmware = "SVST8_4IM2_72",

@@ -150,6 +150,37 @@ void replay_trace_free(struct replay_trace *const trace)
     memset(trace, 0, sizeof(*trace));
 }
 
+int replay_event_add(struct replay_event_list *const list, const struct replay_event *const event)
+{
+    struct replay_event *const events = grow(list->events, list->count, REPLAY_MAX_EVENTS, sizeof(*events));
+    if (!events)
+        return HM2_ERR_NOMEM;
+    list->events = events;
+    events[list->count++] = *event;
+    return 0;
+}
+
+static int by_time(const void *const a, const void *const b)
+{
+    const struct replay_event *const x = a, *const y = b;
+    if (x->at != y->at)
+        return x->at < y->at ? -1 : 1;
+    return (x->line > y->line) - (x->line < y->line);
+}
+
+int replay_trace_merge(struct replay_trace *const merged, const struct replay_trace *const trace,
+                       const struct replay_test *const test, struct replay_event_list *const list)
+{
+    for (size_t i = 0; i < test->count; i++) {
+        const int err = replay_event_add(list, &trace->events[test->first + i]);
+        if (err)
+            return err;
+    }
+    qsort(list->events, list->count, sizeof(*list->events), by_time);
+    *merged = (struct replay_trace){.in_ns = trace->in_ns, .events = list->events, .event_count = list->count};
+    return 0;
+}
+
 /* ---- meaning of names ------------------------------------------------------------------------------------------- */
 
 /* Registers that every HostMot2 firmware of the old map has (register map 1.2, 2.2, 3.1 to 3.3), under the names that

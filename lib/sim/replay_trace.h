@@ -35,6 +35,17 @@ int HM2_MUST_CHECK replay_trace_parse(struct replay_trace *trace, char *tests, s
                                       size_t events_len, struct hm2_diag *diag);
 void replay_trace_free(struct replay_trace *trace);
 
+/* Events made by the player itself. */
+struct replay_event_list {
+    struct replay_event *events;
+    size_t count;
+};
+
+int HM2_MUST_CHECK replay_event_add(struct replay_event_list *list, const struct replay_event *event);
+/* A trace of one test: its own events with those of the list between them, in order of time. */
+int HM2_MUST_CHECK replay_trace_merge(struct replay_trace *merged, const struct replay_trace *trace,
+                                      const struct replay_test *test, struct replay_event_list *list);
+
 /* ---- meaning of names ------------------------------------------------------------------------------------------- */
 
 /* A register name: exactly this name, or this name followed by an instance number. */
@@ -77,6 +88,8 @@ struct replay_kind {
     /* Stimuli that the recording bench applied without an event of their own. May be NULL. Called with each event
      * before it is played. */
     int (*before_event)(struct replay_run *run, const struct replay_event *event);
+    /* Input events that the recording does not have but its other events tell. May be NULL. */
+    int (*make_inputs)(const struct replay_trace *trace, const struct replay_test *test, struct replay_event_list *out);
     /* The recording of output edges ends somewhere: edges after the last recorded one are not compared. */
     bool edges_end_early;
     /* Whole folder in another way than tests.csv and events.csv; runs in addition when those exist. May be NULL. */
@@ -140,6 +153,9 @@ int replay_pwm_measure(const struct replay_kind *kind, const struct replay_files
                        const struct replay_options *options, struct replay_totals *totals, struct hm2_diag *diag);
 int replay_pin_truth(const struct replay_kind *kind, const struct replay_files *files,
                      const struct replay_options *options, struct replay_totals *totals, struct hm2_diag *diag);
+
+int replay_muxed_inputs(const struct replay_trace *trace, const struct replay_test *test,
+                        struct replay_event_list *out);
 
 /* Result of one test to the caller. */
 void replay_report(const struct replay_options *options, struct replay_totals *totals, const char *test,

@@ -1,0 +1,214 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* What the plain and the multiplexed encoder module have in common: registers, time stamps, samples, followers. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "map.h"
+#include "sim_qcounter.h"
+
+#define TSDIV_TOP_BIT 0x8000u
+#define STEP_ONE      (1ll << 32) /* of sim_stepgen_position() */
+
+/* ---- life
+ * ------------------------------------------------------------------------------------------------------------- */
+
+int sim_qc_bank_init(struct sim_module *const m, struct sim_qc_bank *const bank)
+{
+    const bool new_map = sim_map_is_new(sim_idrom(m->card));
+    bank->type.error_by_one = new_map;
+    bank->type.filter_halved = new_map;
+    bank->type.dpll_select = new_map && hm2_idrom_find(sim_idrom(m->card), HM2_GTAG_DPLL);
+    bank->count = m->md.instances;
+    const size_t n = bank->count ? bank->count : 1;
+    bank->counters = calloc(n, sizeof(*bank->counters));
+    bank->follows = calloc(n, sizeof(*bank->follows));
+    return bank->counters && bank->follows ? 0 : HM2_ERR_NOMEM;
+}
+
+void sim_qc_bank_release(struct sim_qc_bank *const bank)
+{
+    free(bank->counters);
+    free(bank->follows);
+}
+
+void sim_qc_bank_power_up(struct sim_module *const m, struct sim_qc_bank *const bank)
+{
+    memset(bank->counters, 0, bank->count * sizeof(*bank->counters));
+    memset(bank->follows, 0, bank->count * sizeof(*bank->follows));
+    for (unsigned i = 0; i < bank->count; i++)
+        bank->counters[i].last_edge = INT64_MIN;
+    bank->stamps = (struct sim_timestamp){.since = m->clk};
+    sim_divider_start(&bank->stamps.divider, m->clk, 0, TSDIV_TOP_BIT);
+    bank->select = 0;
+    bank->sampled_stamp = 0;
+}
+
+/* ---- registers
+ * -------------------------------------------------------------------------------------------------------- */
+
+static bool transparent(const struct sim_qc_bank *const bank)
+{
+    return !(bank->select & 8u);
+}
+
+/* With a DPLL the bus sees registers behind the counters: those of one clock ago, or what the timer sampled (3.5.6). */
+static uint32_t seen(const struct sim_qc_bank *const bank, const struct sim_qcounter *const q, const bool control,
+                     const int64_t clk)
+{
+    if (bank->type.dpll_select && !transparent(bank))
+        return control ? q->sampled_control : q->sampled_data;
+    if (bank->type.dpll_select && q->last_edge == clk - 1)
+        return control ? q->before_control : q->before_data;
+    return control ? sim_qcounter_control(q) : sim_qcounter_data(q);
+}
+
+static uint32_t read_stamp(const struct sim_qc_bank *const bank, const int64_t clk)
+{
+    if (!bank->type.dpll_select)
+        return sim_timestamp_at(&bank->stamps, clk);
+    return transparent(bank) ? sim_timestamp_at(&bank->stamps, clk - 1) : bank->sampled_stamp;
+}
+
+uint32_t sim_qc_bank_read(struct sim_module *const m, struct sim_qc_bank *const bank, const unsigned page,
+                          const unsigned low, uint32_t *const undriven)
+{
+    const unsigned instance = low / 4;
+    *undriven = 0;
+    switch (page) {
+    case SIM_QC_PAGE_COUNT:
+    case SIM_QC_PAGE_CONTROL:
+        if (instance >= bank->count)
+            break;
+        if (page == SIM_QC_PAGE_CONTROL && !bank->type.probe)
+            *undriven = SIM_QC_LATCH_ON_PROBE | SIM_QC_PROBE_POL;
+        return seen(bank, &bank->counters[instance], page == SIM_QC_PAGE_CONTROL, m->clk);
+    case SIM_QC_PAGE_TSDIV:
+        *undriven = 0xFFFF0000u;
+        return bank->stamps.divisor;
+    case SIM_QC_PAGE_TSCOUNT:
+        *undriven = 0xFFFF0000u;
+        return read_stamp(bank, m->clk);
+    case SIM_QC_PAGE_SELECT:
+        if (!bank->type.dpll_select)
+            break;
+        return (uint32_t)bank->select << 12;
+    default:
+        break;
+    }
+    *undriven = UINT32_MAX;
+    return 0;
+}
+
+void sim_qc_bank_write(struct sim_qc_bank *const bank, const int64_t clk, const unsigned page, const uint32_t value)
+{
+    struct sim_timestamp *const ts = &bank->stamps;
+    if (page == SIM_QC_PAGE_TSDIV) {
+        ts->base = sim_timestamp_at(ts, clk + 1);
+        ts->since = clk + 1;
+        ts->divisor = (uint16_t)value;
+        sim_divider_write(&ts->divider, clk, ts->divisor, TSDIV_TOP_BIT);
+    } else if (page == SIM_QC_PAGE_SELECT && bank->type.dpll_select) {
+        bank->select = value >> 12 & 0xFu;
+    }
+}
+
+/* ---- samples of a DPLL timer
+ * -------------------------------------------------------------------------------------------- */
+
+void sim_qc_bank_sample(struct sim_qc_bank *const bank, const int64_t clk)
+{
+    for (unsigned i = 0; i < bank->count; i++) {
+        struct sim_qcounter *const q = &bank->counters[i];
+        q->sampled_data = sim_qcounter_data(q);
+        q->sampled_control = sim_qcounter_control(q);
+    }
+    bank->sampled_stamp = sim_timestamp_at(&bank->stamps, clk);
+}
+
+/* Selections above 4 see timer 0 (newer source). */
+static unsigned timer_of(const struct sim_qc_bank *const bank)
+{
+    const unsigned timer = bank->select & 7u;
+    return timer <= 4 ? timer : 0;
+}
+
+int64_t sim_qc_bank_next_sample(struct sim_module *const m, const struct sim_qc_bank *const bank)
+{
+    if (!bank->type.dpll_select || transparent(bank))
+        return SIM_NEVER;
+    return sim_dpll_next_rise(m->card, timer_of(bank), m->clk);
+}
+
+int64_t sim_qc_bank_sample_edge(struct sim_module *const m, const struct sim_qc_bank *const bank, const int64_t clk)
+{
+    if (!bank->type.dpll_select || transparent(bank))
+        return INT64_MIN;
+    /* A timer that is high after edge r is sampled at edge r + 1. */
+    const int64_t rise = sim_dpll_last_rise(m->card, timer_of(bank), clk - 1);
+    return rise == INT64_MIN ? INT64_MIN : rise + 1;
+}
+
+/* ---- followers
+ * ---------------------------------------------------------------------------------------------------------- */
+
+/* When the last count came, as if the step generator had run evenly since it was looked at last: the counts lie at
+ * multiples of `one`, and the way went from f->part to f->part + way. */
+static int64_t last_count_clk(const struct sim_follow *const f, const sim_wide way, const sim_wide counts,
+                              const sim_wide one, const int64_t clk)
+{
+    const sim_wide boundary = (counts > 0 ? counts : counts + 1) * one;
+    const double fraction = (double)(boundary - f->part) / (double)way;
+    return f->seen_clk + (int64_t)(fraction * (double)(clk - f->seen_clk));
+}
+
+static void follow(struct sim_qc_bank *const bank, const unsigned i, const int64_t position, const int64_t clk)
+{
+    struct sim_follow *const f = &bank->follows[i];
+    struct sim_qcounter *const q = &bank->counters[i];
+    const sim_wide one = (sim_wide)f->den * STEP_ONE;
+    const sim_wide way = (sim_wide)(int64_t)((uint64_t)position - (uint64_t)f->seen) * f->num;
+    const sim_wide end = f->part + way;
+    const sim_wide counts = end >= 0 ? end / one : -((one - 1 - end) / one);
+    if (counts != 0) {
+        q->stamp = sim_timestamp_at(&bank->stamps, last_count_clk(f, way, counts, one, clk));
+        q->count = (uint16_t)(q->count + (uint64_t)counts);
+    }
+    f->part = end - counts * one;
+    f->seen = position;
+    f->seen_clk = clk;
+}
+
+void sim_qc_bank_follow(struct sim_module *const m, struct sim_qc_bank *const bank, const int64_t clk)
+{
+    for (unsigned i = 0; i < bank->count; i++)
+        if (bank->follows[i].active)
+            follow(bank, i, sim_stepgen_position(m->card, bank->follows[i].stepgen), clk);
+}
+
+static struct sim_module *encoder_module(struct sim_card *const card, const unsigned encoder)
+{
+    struct sim_module *const m = sim_find(card, HM2_GTAG_ENCODER);
+    return m && encoder < m->md.instances ? m : NULL;
+}
+
+int sim_card_follow(struct sim_card *const card, const unsigned encoder, const unsigned stepgen, const int32_t num,
+                    const int32_t den)
+{
+    struct sim_module *const m = encoder_module(card, encoder);
+    const struct hm2_md *const steps = hm2_idrom_find(sim_idrom(card), HM2_GTAG_STEPGEN);
+    if (!m || !steps || stepgen >= steps->instances)
+        return HM2_ERR_NOTFOUND;
+    if (den <= 0)
+        return HM2_ERR_RANGE;
+    struct sim_qc_bank *const bank = m->state;
+    bank->follows[encoder] = (struct sim_follow){
+        .active = true,
+        .stepgen = stepgen,
+        .num = num,
+        .den = den,
+        .seen = sim_stepgen_position(card, stepgen),
+        .seen_clk = m->clk,
+    };
+    m->watched = true; /* a DPLL timer that samples it must find it at the position of that moment */
+    return 0;
+}
