@@ -5,6 +5,12 @@
 
 #include <hm2/module.h>
 
+/* One row of a module's list of groups. */
+#define HM2_GROUP(where, table, when)                                                                        \
+    {                                                                                                        \
+        .prefix = (where), .points = (table), .count = sizeof(table) / sizeof(table)[0], .condition = (when) \
+    }
+
 /* Create the points of a documented group for the struct at base. The group's prefix ("stepgen.##") is put behind the
  * board's, and the run of '#' in it is replaced by index. Set-up time only. */
 int HM2_MUST_CHECK hm2_bind_group(const struct hm2_setup *setup, const struct hm2_point_group *group, void *base,

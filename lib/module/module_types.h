@@ -5,4 +5,9 @@
 
 #include <hm2/module.h>
 
+extern const struct hm2_module_type hm2_encoder_type;
+extern const struct hm2_module_type hm2_muxed_encoder_type;
+extern const struct hm2_module_type hm2_pwmgen_type;
+extern const struct hm2_module_type hm2_stepgen_type;
+
 #endif

@@ -6,5 +6,5 @@
 #include "module_types.h"
 
 const struct hm2_module_type *const hm2_module_types[] = {
-    NULL,
+    &hm2_encoder_type, &hm2_muxed_encoder_type, &hm2_pwmgen_type, &hm2_stepgen_type, NULL,
 };

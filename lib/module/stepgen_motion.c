@@ -1,0 +1,162 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * How fast a step generator is to step: the velocity and position modes of hal-interface 2.7, with its verdicts (8.2).
+ */
+#include "stepgen.h"
+
+#include <math.h>
+
+#define SMALLEST_SCALE 1e-6 /* steps per unit; below it hal-interface 2.7 takes 1 */
+#define TWO_TO_32      4294967296.0
+#define HEADROOM       1.001 /* a command this much faster than the limit is told to a person */
+
+static double report(const struct hm2_module *const module, const enum hm2_notice notice, const unsigned number,
+                     const double found, const double used)
+{
+    hm2_notice(module, notice, number, found);
+    return used;
+}
+
+void stepgen_take_scale(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number)
+{
+    double scale = *gen->position_scale;
+    if (!isfinite(scale))
+        scale = report(module, HM2_NOTICE_VALUE_INVALID, number, scale, 1.0);
+    else if (fabs(scale) < SMALLEST_SCALE)
+        scale = report(module, HM2_NOTICE_VALUE_CLAMPED, number, scale, signbit(scale) ? -1.0 : 1.0);
+    *gen->position_scale = scale;
+    gen->scale = scale;
+    /* The limits are in units of the scale: have them taken over again. */
+    gen->maxvel_seen = NAN;
+}
+
+bool stepgen_limits_changed(const struct stepgen *const gen)
+{
+    /* Written so that a NaN counts as changed. */
+    return !(*gen->maxvel == gen->maxvel_seen) || !(*gen->maxaccel == gen->maxaccel_seen) ||
+           !(*gen->position_scale == gen->scale);
+}
+
+/* A limit that must be finite and not negative; 0 = none. */
+static double usable_limit(const struct hm2_module *const module, const unsigned number, const double value,
+                           const double fallback)
+{
+    if (!isfinite(value))
+        return report(module, HM2_NOTICE_VALUE_INVALID, number, value, fallback);
+    return value < 0.0 ? report(module, HM2_NOTICE_VALUE_CLAMPED, number, value, -value) : value;
+}
+
+void stepgen_take_limits(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number)
+{
+    const struct stepgen_module *const ctx = module->context;
+    if (!(*gen->position_scale == gen->scale))
+        stepgen_take_scale(gen, module, number);
+
+    const uint32_t len_ns = *gen->time_ns[STEPGEN_STEPLEN], space_ns = *gen->time_ns[STEPGEN_STEPSPACE];
+    const double pulse_ns = (double)len_ns + (double)space_ns;
+    const double step_hz = pulse_ns > 0.0 ? fmin(1e9 / pulse_ns, ctx->max_step_hz) : ctx->max_step_hz;
+    const double fastest = step_hz / fabs(gen->scale);
+    double maxvel = usable_limit(module, number, *gen->maxvel, 0.0);
+    if (maxvel > fastest)
+        maxvel = report(module, HM2_NOTICE_VALUE_CLAMPED, number, maxvel, fastest);
+    /* Not a number is no reason to accelerate without limit: the default is the safe side. */
+    const double accel = usable_limit(module, number, *gen->maxaccel, 1.0);
+
+    *gen->maxvel = maxvel;
+    *gen->maxaccel = accel;
+    gen->maxvel_seen = maxvel;
+    gen->maxaccel_seen = accel;
+    gen->limit = maxvel > 0.0 ? maxvel : fastest;
+    gen->accel = accel;
+    gen->inverse_accel = accel > 0.0 ? 1.0 / accel : 0.0;
+    gen->rate_per_velocity = gen->scale * (TWO_TO_32 / ctx->clock_hz);
+}
+
+static double clamp(const double value, const double low, const double high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+/* A command pin as a number, or what to use instead of NaN and infinities. */
+static double usable_command(const struct hm2_module *const module, const unsigned number, const double command,
+                             const double fallback)
+{
+    const double usable = hm2_finite_or(command, fallback);
+    if (usable == command)
+        return usable;
+    return report(module, HM2_NOTICE_VALUE_INVALID, number, command, usable);
+}
+
+/* Acceleration that brings the velocity to the command's, and the time it needs. Without a limit the original
+ * algorithm takes one period, in the direction that its sign rule gives: kept, because it makes the motion. */
+static double acceleration_to_match(const struct stepgen *const gen, const double velocity_error, const double period_s,
+                                    double *const match_s)
+{
+    if (velocity_error == 0.0) {
+        *match_s = 0.0;
+        return 0.0;
+    }
+    if (gen->accel > 0.0) {
+        *match_s = fabs(velocity_error) * gen->inverse_accel;
+        return velocity_error > 0.0 ? -gen->accel : gen->accel;
+    }
+    const double acceleration = -(fabs(velocity_error) / period_s);
+    *match_s = -velocity_error / acceleration;
+    return acceleration;
+}
+
+static double follow(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number,
+                     const double command, const double period_s)
+{
+    const struct stepgen_module *const ctx = module->context;
+    const double per_second = ctx->inverse_period;
+    const double before = gen->velocity;
+    const double feed_forward = (command - gen->old_cmd) * per_second;
+    const double velocity_error = before - feed_forward;
+    double match_s;
+    double acceleration = acceleration_to_match(gen, velocity_error, period_s, &match_s);
+    const double position_then = gen->position + 0.5 * (feed_forward + before) * (match_s + period_s);
+    const double command_then = command + feed_forward * match_s;
+    const double error_then = position_then - command_then;
+
+    *gen->dbg_pos_minus_prev_cmd = gen->position - gen->old_cmd;
+    *gen->dbg_ff_vel = feed_forward;
+    *gen->dbg_vel_error = velocity_error;
+    *gen->dbg_s_to_match = fabs(match_s); /* never negative: verdict of hal-interface 8.2 */
+    *gen->dbg_err_at_match = error_then;
+    gen->old_cmd = command;
+    if (fabs(feed_forward) > gen->limit * HEADROOM)
+        hm2_notice(module, HM2_NOTICE_HEADROOM, number, feed_forward);
+
+    if (match_s < period_s) {
+        const double velocity = feed_forward - 0.5 * error_then * per_second;
+        const double step = gen->accel * period_s;
+        return gen->accel > 0.0 ? clamp(velocity, before - step, before + step) : velocity;
+    }
+    /* Would ramping the other way for one period bring us nearer? */
+    const double change = -2.0 * acceleration * period_s * match_s;
+    if (fabs(error_then + 2.0 * change) < fabs(error_then))
+        acceleration = -acceleration;
+    return before + acceleration * period_s;
+}
+
+double stepgen_velocity(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number,
+                        const struct hm2_cycle *const cycle)
+{
+    double velocity;
+    if (*gen->control_type) {
+        velocity = usable_command(module, number, *gen->velocity_cmd, 0.0);
+        if (gen->accel > 0.0) {
+            const double step = gen->accel * cycle->period_s;
+            velocity = clamp(velocity, gen->velocity - step, gen->velocity + step);
+        }
+        gen->old_cmd = hm2_finite_or(*gen->position_cmd, gen->old_cmd);
+    } else {
+        const double command = usable_command(module, number, *gen->position_cmd, gen->old_cmd);
+        velocity = follow(gen, module, number, command, cycle->period_s);
+    }
+    /* Commands beyond what a double can subtract end as NaN: stand still rather than guess. */
+    if (!(velocity == velocity))
+        return 0.0;
+    return clamp(velocity, -gen->limit, gen->limit);
+}
