@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "lbp16_engine.h"
 #include "profiles.h"
 
 #define PAGE_SHIFT       8
@@ -279,7 +280,8 @@ static int build(struct sim_card *const card, const struct sim_card_options *con
     struct hm2_image room;
     card->image = *image_of(options, profile, &room);
     sim_image_read(&card->image, &card->idrom);
-    const enum sim_bus bus = options->bus != SIM_BUS_OF_PROFILE ? options->bus : profile->bus;
+    const enum sim_bus natural = profile->efinix ? SIM_BUS_ZEROS : SIM_BUS_ONES;
+    const enum sim_bus bus = options->bus != SIM_BUS_OF_PROFILE ? options->bus : natural;
     card->undriven_value = bus == SIM_BUS_ONES ? UINT32_MAX : 0;
     for (unsigned i = 0; i < card->idrom.module_count; i++) {
         const int err = add_module(card, &card->idrom.modules[i], diag);
@@ -293,7 +295,7 @@ static int build(struct sim_card *const card, const struct sim_card_options *con
     for (unsigned io = 0; io < HM2_MAX_PINS; io++)
         card->pads[io].outside = SIM_PULLUP;
     power_up(card);
-    return 0;
+    return sim_lbp16_new(&card->lbp16, card, options, diag);
 }
 
 int sim_card_new(struct sim_card **const card, const struct sim_card_options *const options,
@@ -322,10 +324,12 @@ void sim_card_free(struct sim_card *const card)
         free(card->modules[i].state);
     }
     sim_pins_release(card);
+    sim_lbp16_free(card->lbp16);
     free(card);
 }
 
 void sim_card_power_cycle(struct sim_card *const card)
 {
     power_up(card);
+    sim_lbp16_power_up(card->lbp16);
 }

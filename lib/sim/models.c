@@ -2,11 +2,25 @@
 /* Every module model of the simulated card, one line each. */
 #include "sim_card.h"
 
-extern const struct sim_module_ops sim_hm2dpll_ops, sim_ioport_ops, sim_irq_ops, sim_led_ops, sim_stepgen_ops,
-    sim_watchdog_ops;
-extern const struct sim_module_ops sim_encoder_ops, sim_muxed_encoder_ops, sim_muxed_select_ops;
+extern const struct sim_module_ops sim_encoder_ops;
+extern const struct sim_module_ops sim_hm2dpll_ops;
+extern const struct sim_module_ops sim_ioport_ops;
+extern const struct sim_module_ops sim_irq_ops;
+extern const struct sim_module_ops sim_led_ops;
+extern const struct sim_module_ops sim_muxed_encoder_ops;
+extern const struct sim_module_ops sim_muxed_select_ops;
+extern const struct sim_module_ops sim_stepgen_ops;
+extern const struct sim_module_ops sim_watchdog_ops;
 
 const struct sim_module_ops *const sim_models[] = {
-    &sim_hm2dpll_ops, &sim_watchdog_ops, &sim_ioport_ops,        &sim_stepgen_ops,      &sim_led_ops,
-    &sim_irq_ops,     &sim_encoder_ops,  &sim_muxed_encoder_ops, &sim_muxed_select_ops, NULL,
+    &sim_hm2dpll_ops,       /* 1A */
+    &sim_ioport_ops,        /* 03 */
+    &sim_irq_ops,           /* 01 */
+    &sim_led_ops,           /* 80 */
+    &sim_stepgen_ops,       /* 05 */
+    &sim_watchdog_ops,      /* 02 */
+    &sim_encoder_ops,       /* 04 */
+    &sim_muxed_encoder_ops, /* 0C */
+    &sim_muxed_select_ops,  /* 0D */
+    NULL,
 };

@@ -32,14 +32,14 @@ struct sim_firmware {
 
 struct sim_profile {
     const char *name;
-    char card_name[17]; /* EEPROM and space 7 */
-    enum sim_bus bus;
+    char card_name[17];                     /* EEPROM and space 7 */
+    bool efinix;                            /* undriven bus reads zeros, no boot block; else Xilinx */
     uint16_t lbp_version, firmware_version; /* space 7 (seed 000, "SPACE 7") */
     uint8_t ip[4];                          /* that the card uses as its jumpers say */
     uint8_t eeprom_ip[4];
+    unsigned eeprom_mac_word; /* where the MAC address starts: 1 by the manual, 0 on the recorded card */
     uint8_t flash_id;
     uint32_t flash_bytes;
-    bool boot_block; /* the flash starts with the loader of Xilinx cards */
     const struct sim_firmware *firmware;
 };
 

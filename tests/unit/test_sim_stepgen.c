@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "unit.h"
 
+#include "idrom_files.h"
 #include "random.h"
+#include "sim_card.h"
 #include "stepgen_logic.h"
 #include "trace_folder.h"
 
@@ -176,6 +178,111 @@ static void a_saturated_second_keeps_the_period_of_the_timers(void **state)
     assert_true(steps >= 10000000000 / 19 - 30 && steps <= 10000000000 / 19 + 1);
 }
 
+/* ---- new map: positions latched by a DPLL timer -------------------------------------------------------------------
+ */
+
+#define RATE        0x2000
+#define ACCUM       0x2100
+#define MASTER_DDS  0x2900
+#define DPLL_SELECT 0x2A00
+
+static struct sim_card *new_7i96s(void)
+{
+    struct hm2_image image;
+    load_image(IDROM_7I96S, &image);
+    const struct sim_card_options options = {.profile = "7i96s", .image = &image};
+    struct sim_card *card = NULL;
+    struct hm2_diag diag = {0};
+    assert_int_equal(sim_card_new(&card, &options, &diag), 0);
+    return card;
+}
+
+static void start_motion_and_timers(struct sim_card *const card)
+{
+    sim_card_write(card, 10, MASTER_DDS, 0xFFFFFFFF);
+    sim_card_write(card, 11, RATE, 0x00123456);
+    sim_card_write(card, 12, RATE + 4, 0xFF876543);
+    sim_card_write(card, 13, 0x7200, 1u << 24);
+    sim_card_write(card, 14, 0x7400, 0x40008000); /* timers a quarter and half a period early */
+    sim_card_write(card, 15, 0x7500, 0xC0000100);
+    sim_card_write(card, 300, 0x7000, 0xFFFFFFFF); /* period 1024 clocks */
+}
+
+static bool timer_level(struct sim_card *const card, const uint32_t select)
+{
+    const unsigned timer = select >> 12 & 7u;
+    struct sim_module *const dpll = sim_find(card, HM2_GTAG_DPLL);
+    return dpll->ops->output(dpll, 0, (uint8_t)(0x82 + (timer <= 4 ? timer : 0))) == SIM_HIGH;
+}
+
+/* The firmware keeps the read-back in a register of its own: each clock while the select is off, else at the edge that
+ * sees the selected timer high and saw it (or the timer selected before) low one edge earlier. */
+static void a_latched_position_is_that_of_the_edge_after_the_timer_rose(void **state)
+{
+    (void)state;
+    struct random r = {1};
+    struct sim_card *const card = new_7i96s();
+    start_motion_and_timers(card);
+    uint32_t select = 0, latched[2] = {0};
+    bool was_high = timer_level(card, select);
+    unsigned held = 0;
+    for (int64_t clk = sim_card_clock(card); clk < 60000; clk++) {
+        const bool high = timer_level(card, select);
+        const bool sample = (high && !was_high) || !(select & 0x8000);
+        for (unsigned i = 0; i < 2 && sample; i++)
+            latched[i] = (uint32_t)(sim_stepgen_position(card, i) >> 16);
+        held += !sample;
+        was_high = high;
+        if (random_below(&r, 400) == 0) {
+            select = (random_below(&r, 8) << 12) | (random_below(&r, 4) ? 0x8000u : 0);
+            sim_card_write(card, clk, DPLL_SELECT, select | 0xFFFF0FFF);
+        } else {
+            sim_card_advance(card, clk + 1);
+        }
+        if (random_below(&r, 3))
+            continue;
+        assert_int_equal(sim_card_read(card, clk + 1, ACCUM, NULL), latched[0]);
+        assert_int_equal(sim_card_read(card, clk + 1, ACCUM + 4, NULL), latched[1]);
+        assert_int_equal(sim_card_read(card, clk + 1, DPLL_SELECT, NULL), select);
+    }
+    assert_true(held > 10000);
+    sim_card_free(card);
+}
+
+static void the_select_register_is_not_there_without_a_dpll(void **state)
+{
+    (void)state;
+    struct hm2_image image;
+    assert_true(replay_firmware("SVST4_4_48", &image));
+    const struct sim_card_options options = {.profile = "7i93", .image = &image};
+    struct sim_card *card = NULL;
+    struct hm2_diag diag = {0};
+    assert_int_equal(sim_card_new(&card, &options, &diag), 0);
+    uint32_t undriven = 0;
+    sim_card_read(card, 10, DPLL_SELECT, &undriven);
+    assert_int_equal(undriven, 0xFFFFFFFF);
+    sim_card_read(card, 10, ACCUM + 16, &undriven); /* a fifth generator */
+    assert_int_equal(undriven, 0xFFFFFFFF);
+    sim_card_free(card);
+}
+
+/* ---- 64-bit position for followers --------------------------------------------------------------------------------
+ */
+
+static void the_followers_position_goes_on_where_the_register_wraps(void **state)
+{
+    (void)state;
+    struct sim_card *const card = new_7i96s();
+    sim_card_write(card, 10, MASTER_DDS, 0xFFFFFFFF);
+    sim_card_write(card, 11, RATE, 0x40000000);
+    sim_card_advance(card, 400011);
+    assert_true(sim_stepgen_position(card, 0) >> 32 > 99990 && sim_stepgen_position(card, 0) >> 32 <= 100000);
+    sim_card_write(card, 400012, ACCUM, 0);
+    assert_true(sim_stepgen_position(card, 0) >> 32 > 99990); /* the register jumps, the machine does not */
+    assert_int_equal(sim_stepgen_position(card, 7), 0);       /* there is no such generator */
+    sim_card_free(card);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -184,6 +291,9 @@ int main(void)
         cmocka_unit_test(a_tick_that_the_master_dds_leaves_out_is_left_out_in_closed_form_too),
         cmocka_unit_test(a_second_at_ten_million_steps_costs_nearly_nothing),
         cmocka_unit_test(a_saturated_second_keeps_the_period_of_the_timers),
+        cmocka_unit_test(a_latched_position_is_that_of_the_edge_after_the_timer_rose),
+        cmocka_unit_test(the_select_register_is_not_there_without_a_dpll),
+        cmocka_unit_test(the_followers_position_goes_on_where_the_register_wraps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

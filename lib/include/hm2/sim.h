@@ -89,33 +89,56 @@ HM2_API int HM2_MUST_CHECK sim_card_follow(struct sim_card *card, unsigned encod
 
 /* ---- packets ---------------------------------------------------------------------------------------------------- */
 
-/* Card time that belongs to a time of the outside world; set once, then advanced by the packet functions. */
+/* Card time that belongs to a time of the outside world; the first packet sets it when nobody did. */
 HM2_API void sim_card_set_time(struct sim_card *card, int64_t now_ns);
-/* One datagram arrives at now_ns. Returns the length of the reply (0 = none) and when it leaves in *reply_ns. */
+/* Card time at a time of the outside world. */
+HM2_API int64_t sim_card_clock_at(const struct sim_card *card, int64_t now_ns);
+/* One datagram to the card's LBP16 port arrives at now_ns. Returns the length of the reply (0 = none) and when it
+ * leaves in *reply_ns (may be NULL). A card that is busy with an earlier packet takes this one afterwards. */
 HM2_API size_t sim_card_packet(struct sim_card *card, int64_t now_ns, const uint8_t *request, size_t request_len,
                                uint8_t *reply, size_t capacity, int64_t *reply_ns);
+/* The same with whole Ethernet frames, without checksums as the firmware sees and makes them: ARP for the card's
+ * address, ICMP echo, UDP. Frames are taken as they are (Ethernet pads to 60 bytes: the caller's affair). */
+HM2_API size_t sim_card_frame(struct sim_card *card, int64_t now_ns, const uint8_t *frame, size_t frame_len,
+                              uint8_t *reply, size_t capacity, int64_t *reply_ns);
+HM2_API void sim_card_mac(const struct sim_card *card, uint8_t mac[6]);
+HM2_API void sim_card_ip(const struct sim_card *card, uint8_t ip[4]);
+/* The bytes of the configuration flash and of the settings EEPROM, kept over power cycles; the caller may change
+ * them between packets. *size (may be NULL) in bytes and in 16-bit words. */
+HM2_API uint8_t *sim_card_flash(struct sim_card *card, size_t *size);
+HM2_API uint16_t *sim_card_eeprom(struct sim_card *card, size_t *words);
 
 /* ---- the network between, with faults from a seed --------------------------------------------------------------- */
 
 struct sim_faults {
     uint64_t seed;
     double loss, duplicate, reorder, truncate, foreign; /* probability per datagram, each direction, 0..1 */
-    int64_t delay_min_ns, delay_max_ns;                 /* uniform, on top of the card's own time */
+    int64_t delay_min_ns, delay_max_ns;                 /* uniform, on top of the card's own time; 0..1 s */
 };
+
+/* 0, or HM2_ERR_RANGE for a probability outside 0..1, or delays outside 0..1 s or with min > max. */
+HM2_API int HM2_MUST_CHECK sim_faults_check(const struct sim_faults *faults);
 
 struct sim_net;
 
 /* A client's view of a card through such a network, in virtual time: a struct link whose now_ns is the network's
- * clock. recv() with a deadline lets virtual time pass up to the reply or the deadline. */
+ * clock, which starts at 0. recv() with a deadline lets virtual time pass up to the reply or the deadline. A stranger
+ * sends requests of its own to the card (its replies go elsewhere) and datagrams to the client (the link counts and
+ * drops them). The same seed and the same calls give the same faults. send() and recv() allocate nothing.
+ * Errors as sim_faults_check(). faults may be NULL. */
 HM2_API int HM2_MUST_CHECK sim_net_new(struct sim_net **net, struct sim_card *card, const struct sim_faults *faults);
-HM2_API void sim_net_free(struct sim_net *net);
+HM2_API void sim_net_free(struct sim_net *net);         /* not the card */
 HM2_API struct link *sim_net_link(struct sim_net *net); /* owned by the net; its close() does nothing */
-HM2_API void sim_net_set_faults(struct sim_net *net, const struct sim_faults *faults);
+HM2_API int sim_net_set_faults(struct sim_net *net, const struct sim_faults *faults);
 HM2_API void sim_net_sleep_until(struct sim_net *net, int64_t now_ns);
 HM2_API void sim_net_freeze(struct sim_net *net, bool frozen); /* the card hears and says nothing */
-/* What really happened, by cause. Datagrams to the card (0) and from it (1). */
+/* What really happened, by cause. Datagrams to the card (0) and from it (1). A datagram counts as reordered when it is
+ * delivered after one that was sent later, whatever made it late. */
 struct sim_net_truth {
     uint64_t sent[2], lost[2], duplicated[2], reordered[2], truncated[2], foreign[2];
+    uint64_t delivered[2]; /* handed to the card, or queued for the client; without the stranger's */
+    uint64_t unheard;      /* came to a frozen card */
+    uint64_t overflow[2];  /* more on their way, or waiting for the client, than there is room for */
 };
 HM2_API struct sim_net_truth sim_net_truth(const struct sim_net *net);
 

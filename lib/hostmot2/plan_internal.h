@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Inside of the transfer plan: what plan_layout.c lays out and plan_cycle.c uses. */
+#ifndef HM2_PLAN_INTERNAL_H
+#define HM2_PLAN_INTERNAL_H
+
+#include <hm2/plan.h>
+
+/* Longer than any good reply, so that a longer one does not fit exactly. */
+#define PLAN_REPLY_CAPACITY 1536u
+
+/* Scratch registers of space 4 that hold our numbers, two words each. */
+enum {
+    PLAN_SCRATCH_REQUEST = LBP16_TIMER_SCRATCH,
+    PLAN_SCRATCH_WRITE = LBP16_TIMER_SCRATCH + 4,
+    PLAN_SCRATCH_SESSION = LBP16_TIMER_SCRATCH + 8,
+    PLAN_SCRATCH_WORDS = 6,
+};
+
+/* What stands behind the windows in a reply. */
+enum {
+    PLAN_TRAILER_REQUEST = 0,
+    PLAN_TRAILER_WRITE = 4,
+    PLAN_TRAILER_SESSION = 8,
+    PLAN_TRAILER_RX_UDP = 12,
+    PLAN_TRAILER_BYTES = 14,
+};
+
+/* Commands of our own: word, address and data. */
+enum {
+    PLAN_COMMAND_BYTES = 4,         /* word and address of any command */
+    PLAN_ADDRESS_BYTES = 2,         /* in front of the data of a write */
+    PLAN_NUMBER_BYTES = 8,          /* write of one number */
+    PLAN_SESSION_BYTES = 6 + 8,     /* HM2Timeout = 0, session number */
+    PLAN_REQUEST_BYTES = 8 + 2 * 4, /* write of the sequence number and the two reads of the trailer */
+};
+
+struct plan_window {
+    struct hm2_window *window;
+    uint16_t address, words;
+    uint8_t rank;
+    bool movable;
+};
+
+struct plan_list {
+    struct plan_window at[HM2_PLAN_MAX_WINDOWS];
+    unsigned count, commands;
+};
+
+struct plan_section {
+    struct hm2_section *section;
+    uint32_t write_seq; /* of the last write that carried it */
+    uint16_t at, len;   /* of the command in the set-up stream */
+    uint8_t rank;
+    bool on_demand;
+};
+
+/* State of a part of the set-up stream. A section that was never sent and is on demand is in none of them. */
+enum plan_state { PLAN_DIRTY, PLAN_FLYING, PLAN_CLEAN, PLAN_STATES };
+
+#define PLAN_SET_WORDS ((HM2_PLAN_MAX_SECTIONS + 63u) / 64u)
+
+/* One bit a section, by its number. */
+struct plan_set {
+    uint64_t bits[PLAN_SET_WORDS];
+};
+
+struct hm2_plan {
+    bool frozen;
+    struct plan_list reads, writes;
+    unsigned section_count;
+    struct plan_section sections[HM2_PLAN_MAX_SECTIONS]; /* after freeze in the order of sending */
+    struct plan_set in_state[PLAN_STATES];
+    size_t setup_len;
+
+    uint32_t request_seq;
+    uint64_t requests; /* sent so far */
+    uint64_t answered; /* bit n: the n-th request before the last one got its answer */
+    bool outstanding;
+    uint32_t write_at_request; /* write_seq when the last request was made */
+    size_t request_len, reply_len;
+
+    uint32_t write_seq, section_write_seq; /* last write, last one with sections */
+    size_t fixed_len;
+    uint32_t session, session_write_seq;
+    enum plan_state session_state;
+    struct hm2_plan_facts facts;
+
+    /* Prepared parts of the write datagram. */
+    uint8_t session_commands[PLAN_SESSION_BYTES];
+    uint8_t number_command[PLAN_NUMBER_BYTES];
+
+    uint8_t request[LBP16_MAX_REQUEST_BYTES];
+    uint8_t reply[LBP16_MAX_REPLY_BYTES]; /* the last fresh one */
+    uint8_t landing[PLAN_REPLY_CAPACITY];
+    uint8_t write[LBP16_MAX_REQUEST_BYTES];
+    uint8_t setup[HM2_PLAN_SETUP_BYTES];
+};
+
+#endif

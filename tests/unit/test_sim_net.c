@@ -1,0 +1,285 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* The network between client and simulated card: what it counts is what happens, and it happens again. */
+#include "unit.h"
+
+#include <hm2/bytes.h>
+#include <hm2/lbp16.h>
+#include <hm2/sim.h>
+
+#define MS 1000000
+
+struct rig {
+    struct sim_card *card;
+    struct sim_net *net;
+    struct link *link;
+};
+
+static struct rig rig_with(const struct sim_faults *const faults)
+{
+    const struct sim_card_options options = {.profile = "7i96s", .seed = 1};
+    struct rig rig = {0};
+    assert_int_equal(sim_card_new(&rig.card, &options, NULL), 0);
+    assert_int_equal(sim_net_new(&rig.net, rig.card, faults), 0);
+    rig.link = sim_net_link(rig.net);
+    return rig;
+}
+
+static void drop(struct rig *const rig)
+{
+    sim_net_free(rig->net);
+    sim_card_free(rig->card);
+}
+
+/* Write a number to a scratch register and read it back, in one datagram. */
+static void send_number(const struct rig *const rig, const uint16_t number)
+{
+    uint8_t request[64];
+    struct lbp16_builder b;
+    lbp16_builder_init(&b, request, sizeof request);
+    lbp16_add_write16(&b, LBP16_SPACE_TIMER, LBP16_TIMER_SCRATCH, 1, &number, NULL);
+    lbp16_add_read16(&b, LBP16_SPACE_TIMER, LBP16_TIMER_SCRATCH, 1, NULL);
+    assert_int_equal(b.error, 0);
+    assert_int_equal(link_send(rig->link, request, b.used), 0);
+}
+
+/* Number of the reply, or the error of recv(); -100 - length for a cut reply. */
+static int receive_number(const struct rig *const rig, const int64_t deadline_ns)
+{
+    uint8_t reply[64];
+    const int len = link_recv(rig->link, reply, sizeof reply, deadline_ns);
+    if (len < 0)
+        return len;
+    return len == 2 ? hm2_get_le16(reply) : -100 - len;
+}
+
+static void a_reply_comes_after_the_time_that_the_card_takes(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    send_number(&rig, 42);
+    assert_int_equal(receive_number(&rig, 0), HM2_ERR_TIMEOUT); /* nothing is there yet */
+    assert_int_equal(link_now_ns(rig.link), 0);
+    assert_int_equal(receive_number(&rig, MS), 42);
+    assert_in_range(link_now_ns(rig.link), 12000, 20000);
+    assert_int_equal(receive_number(&rig, MS), HM2_ERR_TIMEOUT);
+    assert_int_equal(link_now_ns(rig.link), MS);
+    drop(&rig);
+}
+
+static void what_came_while_nobody_looked_is_queued(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    send_number(&rig, 1);
+    send_number(&rig, 2);
+    sim_net_sleep_until(rig.net, MS);
+    assert_int_equal(receive_number(&rig, 0), 1);
+    assert_int_equal(receive_number(&rig, 0), 2);
+    assert_int_equal(receive_number(&rig, 0), HM2_ERR_TIMEOUT);
+    assert_int_equal(link_now_ns(rig.link), MS);
+    drop(&rig);
+}
+
+static void a_datagram_longer_than_the_buffer_is_consumed(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    uint8_t byte;
+    send_number(&rig, 1);
+    assert_int_equal(link_recv(rig.link, &byte, 1, MS), HM2_ERR_NOSPACE);
+    assert_int_equal(receive_number(&rig, 2 * MS), HM2_ERR_TIMEOUT);
+    drop(&rig);
+}
+
+static void a_datagram_that_no_frame_holds_is_refused(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    static uint8_t big[LINK_MAX_DATAGRAM_BYTES + 1];
+    assert_int_equal(link_send(rig.link, big, sizeof big), HM2_ERR_NOSPACE);
+    drop(&rig);
+}
+
+struct seen {
+    unsigned in_order, late, repeated, cut, missing, strange;
+    uint64_t fingerprint;
+};
+
+/* A client at 1 kHz that takes whatever comes within its cycle. */
+static struct seen run_cycles(const struct rig *const rig, const unsigned cycles)
+{
+    struct seen seen = {.fingerprint = 1469598103934665603u};
+    static uint8_t times_seen[65536];
+    memset(times_seen, 0, sizeof times_seen);
+    assert_true(cycles < sizeof times_seen);
+    for (unsigned i = 1; i <= cycles; i++) {
+        const int64_t deadline_ns = (int64_t)i * MS;
+        bool answered = false;
+        send_number(rig, (uint16_t)i);
+        for (int got; (got = receive_number(rig, deadline_ns)) != HM2_ERR_TIMEOUT;) {
+            seen.fingerprint = (seen.fingerprint ^ (uint64_t)(uint32_t)got) * 1099511628211u;
+            if (got < 0)
+                seen.cut++;
+            else if (times_seen[got]++)
+                seen.repeated++;
+            else if ((unsigned)got == i)
+                seen.in_order++, answered = true;
+            else
+                seen.late++;
+        }
+        seen.missing += !answered;
+    }
+    return seen;
+}
+
+static void a_perfect_network_brings_every_reply_in_its_cycle(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    const struct seen seen = run_cycles(&rig, 5000);
+    assert_int_equal(seen.in_order, 5000);
+    assert_int_equal(seen.late + seen.repeated + seen.cut + seen.missing, 0);
+    const struct sim_net_truth truth = sim_net_truth(rig.net);
+    assert_int_equal(truth.sent[0], 5000);
+    assert_int_equal(truth.sent[1], 5000);
+    assert_int_equal(truth.delivered[0], 5000);
+    assert_int_equal(truth.delivered[1], 5000);
+    assert_int_equal(truth.reordered[0] + truth.reordered[1], 0);
+    drop(&rig);
+}
+
+static void every_datagram_is_accounted_for(void **state)
+{
+    (void)state;
+    const struct sim_faults faults = {.seed = 3,
+                                      .loss = 0.05,
+                                      .duplicate = 0.02,
+                                      .reorder = 0.02,
+                                      .truncate = 0.01,
+                                      .foreign = 0.03,
+                                      .delay_max_ns = 300000};
+    struct rig rig = rig_with(&faults);
+    const struct seen seen = run_cycles(&rig, 20000);
+    sim_net_sleep_until(rig.net, INT64_C(30000) * MS);
+    unsigned rest = 0;
+    for (int got; (got = receive_number(&rig, 0)) != HM2_ERR_TIMEOUT;)
+        rest++;
+    const struct sim_net_truth t = sim_net_truth(rig.net);
+    assert_int_equal(t.sent[0], 20000);
+    assert_int_equal(t.overflow[0] + t.overflow[1], 0);
+    for (unsigned d = 0; d < 2; d++)
+        assert_int_equal(t.delivered[d], t.sent[d] - t.lost[d] + t.duplicated[d]);
+    assert_int_equal(t.delivered[1], seen.in_order + seen.late + seen.repeated + seen.cut + rest);
+    assert_int_equal(t.delivered[1], rig.link->counters.received);
+    assert_int_equal(t.foreign[1], rig.link->counters.strangers);
+    /* The rates are those asked for, within four standard deviations or so. */
+    assert_in_range(t.lost[0], 850, 1150);
+    assert_in_range(t.duplicated[0], 300, 500);
+    assert_in_range(t.truncated[0], 140, 260);
+    assert_in_range(t.foreign[0], 480, 720);
+    assert_in_range(t.reordered[0], 250, 500);
+    assert_true(seen.late > 0 && seen.repeated > 0 && seen.cut > 0 && seen.missing > 0);
+    drop(&rig);
+}
+
+static void the_card_counts_what_reached_it(void **state)
+{
+    (void)state;
+    const struct sim_faults faults = {.seed = 9, .loss = 0.1, .duplicate = 0.1, .foreign = 0.1};
+    struct rig rig = rig_with(&faults);
+    (void)run_cycles(&rig, 2000);
+    const struct sim_faults none = {0};
+    assert_int_equal(sim_net_set_faults(rig.net, &none), 0);
+    uint8_t request[16], reply[16];
+    struct lbp16_builder b;
+    lbp16_builder_init(&b, request, sizeof request);
+    lbp16_add_read16(&b, LBP16_SPACE_CONTROL, LBP16_CONTROL_RX_UDP, 1, NULL);
+    assert_int_equal(link_send(rig.link, request, b.used), 0);
+    assert_int_equal(link_recv(rig.link, reply, sizeof reply, link_now_ns(rig.link) + MS), 2);
+    const struct sim_net_truth t = sim_net_truth(rig.net);
+    assert_int_equal(hm2_get_le16(reply), t.delivered[0] + t.foreign[0] - 1); /* without the one that asks */
+    drop(&rig);
+}
+
+static void the_same_seed_gives_the_same_faults(void **state)
+{
+    (void)state;
+    struct seen seen[3];
+    struct sim_net_truth truth[3];
+    for (unsigned i = 0; i < 3; i++) {
+        const struct sim_faults faults = {.seed = i < 2 ? 77 : 78,
+                                          .loss = 0.1,
+                                          .duplicate = 0.1,
+                                          .reorder = 0.1,
+                                          .truncate = 0.1,
+                                          .foreign = 0.1,
+                                          .delay_max_ns = 900000};
+        struct rig rig = rig_with(&faults);
+        seen[i] = run_cycles(&rig, 3000);
+        truth[i] = sim_net_truth(rig.net);
+        drop(&rig);
+    }
+    assert_memory_equal(&truth[0], &truth[1], sizeof truth[0]);
+    assert_true(seen[0].fingerprint == seen[1].fingerprint);
+    assert_memory_not_equal(&truth[0], &truth[2], sizeof truth[0]);
+}
+
+static void a_frozen_card_says_nothing_and_goes_on_after(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    sim_net_freeze(rig.net, true);
+    assert_int_equal(run_cycles(&rig, 10).missing, 10);
+    sim_net_freeze(rig.net, false);
+    assert_int_equal(sim_net_truth(rig.net).unheard, 10);
+    send_number(&rig, 7);
+    assert_int_equal(receive_number(&rig, 20 * MS), 7);
+    drop(&rig);
+}
+
+static void a_power_cycle_costs_a_second(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    send_number(&rig, 7);
+    assert_int_equal(receive_number(&rig, MS), 7);
+    sim_card_power_cycle(rig.card);
+    send_number(&rig, 8);
+    assert_int_equal(receive_number(&rig, INT64_C(500) * MS), HM2_ERR_TIMEOUT);
+    sim_net_sleep_until(rig.net, INT64_C(1100) * MS);
+    send_number(&rig, 9);
+    assert_int_equal(receive_number(&rig, INT64_C(1200) * MS), 9);
+    drop(&rig);
+}
+
+static void faults_out_of_range_are_refused(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    const struct sim_faults bad[] = {
+        {.loss = 1.01},       {.duplicate = -0.1},         {.reorder = 2},
+        {.truncate = -1},     {.foreign = 1e300},          {.delay_min_ns = 5, .delay_max_ns = 4},
+        {.delay_min_ns = -1}, {.delay_max_ns = INT64_MAX},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        assert_int_equal(sim_net_set_faults(rig.net, &bad[i]), HM2_ERR_RANGE);
+    drop(&rig);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_reply_comes_after_the_time_that_the_card_takes),
+        cmocka_unit_test(what_came_while_nobody_looked_is_queued),
+        cmocka_unit_test(a_datagram_longer_than_the_buffer_is_consumed),
+        cmocka_unit_test(a_datagram_that_no_frame_holds_is_refused),
+        cmocka_unit_test(a_perfect_network_brings_every_reply_in_its_cycle),
+        cmocka_unit_test(every_datagram_is_accounted_for),
+        cmocka_unit_test(the_card_counts_what_reached_it),
+        cmocka_unit_test(the_same_seed_gives_the_same_faults),
+        cmocka_unit_test(a_frozen_card_says_nothing_and_goes_on_after),
+        cmocka_unit_test(a_power_cycle_costs_a_second),
+        cmocka_unit_test(faults_out_of_range_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
