@@ -72,6 +72,8 @@ static const struct replay_signal stepgen_signals[] = {
     {"out3", REPLAY_OUTPUT, HM2_GTAG_STEPGEN, 0x84, 0},
     {"out4", REPLAY_OUTPUT, HM2_GTAG_STEPGEN, 0x85, 0},
     {"out5", REPLAY_OUTPUT, HM2_GTAG_STEPGEN, 0x86, 0},
+    {"index", REPLAY_INPUT, HM2_GTAG_STEPGEN, 0x01, 0},
+    {"probe", REPLAY_INPUT, HM2_GTAG_STEPGEN, 0x02, 0},
     {NULL, REPLAY_PAD, 0, 0, 0},
 };
 
@@ -176,6 +178,11 @@ static int inputs_low(struct replay_run *const run)
 const struct replay_kind replay_kinds[] = {
     {.folder = "stepgen",
      .firmware = "SVST4_4_48",
+     .profile = "7i93",
+     .registers = stepgen_registers,
+     .signals = stepgen_signals},
+    {.folder = "stepgen_v3",
+     .firmware = "SVST8_4IM2SI_72",
      .profile = "7i93",
      .registers = stepgen_registers,
      .signals = stepgen_signals},

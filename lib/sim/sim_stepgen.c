@@ -3,13 +3,17 @@
 #include "dpll.h"
 #include "map.h"
 #include "sim_card.h"
+#include "stepgen_latch.h"
 #include "stepgen_logic.h"
+
+#include <stddef.h>
 
 #define INSTANCES_MAX 64u /* address bits 7..2 select the instance (1.1) */
 #define PAGES         11u /* registers 0..9, and 10 in the new map */
 
 enum {
     REG_ACCUM = SIM_STEPGEN_ACCUM,
+    REG_MODE = SIM_STEPGEN_MODE,
     REG_MASTER_DDS = SIM_STEPGEN_REGS, /* the first one that all instances share */
     REG_DPLL_SELECT
 };
@@ -23,12 +27,16 @@ enum {
 struct instance {
     struct sim_stepgen gen;
     uint32_t latched; /* new map: what register 1 reads */
+    struct sim_latch_filter filter[SIM_LATCH_INPUTS];
+    uint32_t index_position; /* what index or probe latched: bits 47..16 of the accumulator */
 };
 
 struct stepgens {
     struct sim_rategen rategen;
     bool has_dpll_select;
     uint8_t mode_bits;
+    bool swaps_outputs;
+    const struct sim_latch_kind *latch; /* NULL = no index and probe inputs */
     unsigned count;
     uint16_t dpll_select;
     /* The edge after a write to the select register compares the newly chosen timer with what the old one was. */
@@ -43,9 +51,13 @@ static int init(struct sim_module *const m)
     const struct hm2_idrom *const idrom = sim_idrom(m->card);
     s->count = m->md.instances < INSTANCES_MAX ? m->md.instances : INSTANCES_MAX;
     s->has_dpll_select = sim_map_is_new(idrom) && hm2_idrom_find(idrom, HM2_GTAG_DPLL);
+    s->latch = sim_latch_kind(m->md.version);
+    s->swaps_outputs = m->md.version == 0x42 || m->md.version == 0xC2;
     s->mode_bits = MODE_BITS_PLAIN;
-    if (m->md.version == 0x42 || m->md.version == 0xC2)
+    if (s->swaps_outputs)
         s->mode_bits |= MODE_BIT_SWAP;
+    if (s->latch) /* all bits of the register, used or not (traces stepgen_v3) */
+        s->mode_bits = m->md.version == 0x03 ? 0x7F : 0xFF;
     return 0;
 }
 
@@ -62,12 +74,60 @@ static void power_up(struct sim_module *const m)
 /* ---- time ---------------------------------------------------------------------------------------------------------
  */
 
-static void run(struct stepgens *const s, const int64_t edges)
+static int64_t smaller(const int64_t a, const int64_t b)
+{
+    return a < b ? a : b;
+}
+
+static void run_generators(struct stepgens *const s, const int64_t edges)
 {
     for (unsigned i = 0; i < s->count; i++)
         sim_stepgen_run(&s->instances[i].gen, &s->rategen, edges);
     for (int64_t done = 0; done < edges; done += SIM_STEPGEN_HORIZON)
-        sim_rategen_run(&s->rategen, edges - done < SIM_STEPGEN_HORIZON ? edges - done : SIM_STEPGEN_HORIZON);
+        sim_rategen_run(&s->rategen, smaller(edges - done, SIM_STEPGEN_HORIZON));
+}
+
+/* Index and probe at one edge: copies the accumulator from before it. Returns the mode bits that clear themselves. */
+static uint8_t edge_of_inputs(struct instance *const one, const struct sim_latch_kind *const kind)
+{
+    const uint8_t mode = one->gen.mode;
+    const bool once = kind->just_once_bit == 0 || (mode & kind->just_once_bit);
+    uint8_t clears = 0;
+    for (unsigned input = 0; input < SIM_LATCH_INPUTS; input++) {
+        if (sim_latch_fires(&one->filter[input], kind, input, mode)) {
+            one->index_position = (uint32_t)(one->gen.accum >> 16);
+            clears |= once ? kind->latch_bit[input] : 0;
+        }
+        sim_latch_edge(&one->filter[input], kind);
+    }
+    return clears;
+}
+
+static int64_t quiet_inputs(const struct stepgens *const s, int64_t edges)
+{
+    for (unsigned i = 0; i < s->count; i++)
+        for (unsigned input = 0; input < SIM_LATCH_INPUTS; input++)
+            edges = smaller(edges, sim_latch_quiet(&s->instances[i].filter[input], s->latch));
+    return edges;
+}
+
+static void run(struct stepgens *const s, int64_t edges)
+{
+    while (s->latch && edges > 0) {
+        const int64_t quiet = quiet_inputs(s, edges);
+        for (unsigned i = 0; i < s->count; i++)
+            for (unsigned input = 0; input < SIM_LATCH_INPUTS; input++)
+                sim_latch_run_quiet(&s->instances[i].filter[input], s->latch, quiet);
+        run_generators(s, quiet);
+        edges -= quiet;
+        if (edges == 0)
+            return;
+        for (unsigned i = 0; i < s->count; i++)
+            s->instances[i].gen.mode &= (uint8_t)~edge_of_inputs(&s->instances[i], s->latch);
+        run_generators(s, 1);
+        edges--;
+    }
+    run_generators(s, edges);
 }
 
 /* What register 1 reads is a register of its own, loaded at an edge with the accumulator from before that edge. */
@@ -123,16 +183,21 @@ static int64_t next_event(struct sim_module *const m)
 {
     const struct stepgens *const s = m->state;
     int64_t silent = SIM_STEPGEN_HORIZON;
-    for (unsigned i = 0; i < s->count; i++) {
-        const int64_t own = sim_stepgen_silent(&s->instances[i].gen, &s->rategen);
-        if (own < silent)
-            silent = own;
-    }
+    for (unsigned i = 0; i < s->count; i++)
+        silent = smaller(silent, sim_stepgen_silent(&s->instances[i].gen, &s->rategen));
     return m->clk + silent;
 }
 
 /* ---- registers ----------------------------------------------------------------------------------------------------
  */
+
+/* Mode bits at the bottom, the latched position at the top; what is between is not driven. */
+static uint32_t read_mode(const struct stepgens *const s, const struct instance *const one, uint32_t *const undriven)
+{
+    const uint32_t position_mask = ~(UINT32_MAX >> s->latch->position_bits);
+    *undriven = ~(position_mask | s->mode_bits);
+    return (one->index_position & position_mask) | one->gen.mode;
+}
 
 static uint32_t read_reg(struct sim_module *const m, const unsigned page, const unsigned low, uint32_t *const undriven)
 {
@@ -144,6 +209,8 @@ static uint32_t read_reg(struct sim_module *const m, const unsigned page, const 
         return s->dpll_select;
     if (page == REG_ACCUM && i < s->count)
         return s->has_dpll_select ? s->instances[i].latched : (uint32_t)(s->instances[i].gen.accum >> 16);
+    if (page == REG_MODE && i < s->count && s->latch)
+        return read_mode(s, &s->instances[i], undriven);
     *undriven = UINT32_MAX; /* all others are write-only (trace readback) */
     return 0;
 }
@@ -154,8 +221,12 @@ static void edge(struct sim_module *const m, const unsigned chosen, const struct
     struct stepgens *const s = m->state;
     if (s->has_dpll_select && last_latch(m, m->clk, m->clk + 1) == m->clk)
         latch(s);
-    for (unsigned i = 0; i < s->count; i++)
-        sim_stepgen_edge(&s->instances[i].gen, s->rategen.tick, i == chosen ? write : NULL);
+    for (unsigned i = 0; i < s->count; i++) {
+        struct instance *const one = &s->instances[i];
+        const uint8_t clears = s->latch ? edge_of_inputs(one, s->latch) : 0;
+        sim_stepgen_edge(&one->gen, s->rategen.tick, i == chosen ? write : NULL);
+        one->gen.mode &= (uint8_t)~clears;
+    }
     m->clk++;
 }
 
@@ -176,8 +247,22 @@ static void write_reg(struct sim_module *const m, const unsigned page, const uns
         select_timer(m, value);
 }
 
-/* ---- outputs ------------------------------------------------------------------------------------------------------
+/* ---- inputs and outputs
+ * ------------------------------------------------------------------------------------------------------
  */
+
+/* An index belongs to its generator; there is one probe for all. */
+static void input(struct sim_module *const m, const unsigned unit, const uint8_t secondary_pin, const bool level)
+{
+    struct stepgens *const s = m->state;
+    for (unsigned i = 0; s->latch && i < s->count; i++) {
+        struct instance *const one = &s->instances[i];
+        if (secondary_pin == s->latch->pin[SIM_LATCH_PROBE])
+            one->filter[SIM_LATCH_PROBE].level = level;
+        if (secondary_pin == s->latch->pin[SIM_LATCH_INDEX] && (i == unit || (unit & HM2_UNIT_GLOBAL)))
+            one->filter[SIM_LATCH_INDEX].level = level;
+    }
+}
 
 static enum sim_level output(struct sim_module *const m, const unsigned unit, const uint8_t secondary_pin)
 {
@@ -187,7 +272,7 @@ static enum sim_level output(struct sim_module *const m, const unsigned unit, co
         return SIM_LOW;
     const struct sim_stepgen *const gen = &s->instances[unit].gen;
     unsigned outputs = sim_stepgen_outputs(gen);
-    if (gen->mode & MODE_BIT_SWAP)
+    if (s->swaps_outputs && (gen->mode & MODE_BIT_SWAP))
         outputs = (outputs & ~3u) | (outputs & 1u) << 1 | (outputs >> 1 & 1u);
     return outputs >> number & 1u ? SIM_HIGH : SIM_LOW;
 }
@@ -212,5 +297,6 @@ const struct sim_module_ops sim_stepgen_ops = {
     .read = read_reg,
     .write = write_reg,
     .output = output,
+    .input = input,
     .next_event = next_event,
 };

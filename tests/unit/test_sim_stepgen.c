@@ -4,6 +4,7 @@
 #include "idrom_files.h"
 #include "random.h"
 #include "sim_card.h"
+#include "stepgen_latch.h"
 #include "stepgen_logic.h"
 #include "trace_folder.h"
 
@@ -13,6 +14,9 @@ static void every_recorded_read_and_edge_is_matched(void **state)
     const struct replay_totals totals = replay_data("stepgen");
     assert_int_equal(totals.failed, 0);
     assert_int_equal(totals.passed, 43);
+    const struct replay_totals with_index = replay_data("stepgen_v3");
+    assert_int_equal(with_index.failed, 0);
+    assert_int_equal(with_index.passed, 15);
 }
 
 /* ---- closed form against clock by clock ---------------------------------------------------------------------------
@@ -183,6 +187,7 @@ static void a_saturated_second_keeps_the_period_of_the_timers(void **state)
 
 #define RATE        0x2000
 #define ACCUM       0x2100
+#define MODE        0x2200
 #define MASTER_DDS  0x2900
 #define DPLL_SELECT 0x2A00
 
@@ -266,6 +271,106 @@ static void the_select_register_is_not_there_without_a_dpll(void **state)
     sim_card_free(card);
 }
 
+/* ---- index and probe ----------------------------------------------------------------------------------------------
+ */
+
+static void a_filter_run_in_closed_form_equals_the_same_run_clock_by_clock(void **state)
+{
+    (void)state;
+    static const uint8_t versions[] = {0x03, 0xC2};
+    for (unsigned seed = 0; seed < 400; seed++) {
+        struct random r = {seed};
+        const struct sim_latch_kind *const kind = sim_latch_kind(versions[seed & 1]);
+        struct sim_latch_filter fast = {0}, slow = {0};
+        for (unsigned i = 0; i < 40; i++) {
+            fast.level = slow.level = random_below(&r, 2);
+            int64_t edges = 1 + random_below(&r, random_below(&r, 2) ? 300 : 20);
+            for (int64_t k = 0; k < edges; k++)
+                sim_latch_edge(&slow, kind);
+            while (edges > 0) {
+                const int64_t quiet = sim_latch_quiet(&fast, kind) < edges ? sim_latch_quiet(&fast, kind) : edges;
+                sim_latch_run_quiet(&fast, kind, quiet);
+                edges -= quiet;
+                if (edges-- > 0)
+                    sim_latch_edge(&fast, kind);
+            }
+            assert_memory_equal(&fast, &slow, sizeof fast);
+        }
+    }
+}
+
+#define INDEX_PIN 0x09
+#define PROBE_PIN 0x0A
+
+/* The 7I96S's firmware as it would be with index inputs: version 0xC2 of the step generator. */
+static struct sim_card *new_c2(void)
+{
+    struct hm2_image image;
+    load_image(IDROM_7I96S, &image);
+    for (unsigned i = 0; i < HM2_IDROM_WORDS; i++)
+        if (image.rom[i] == 0x05010205)
+            image.rom[i] = 0x0501C205;
+    const struct sim_card_options options = {.profile = "7i96s", .image = &image};
+    struct sim_card *card = NULL;
+    struct hm2_diag diag = {0};
+    assert_int_equal(sim_card_new(&card, &options, &diag), 0);
+    sim_card_write(card, 10, MASTER_DDS, 0xFFFFFFFF);
+    sim_card_write(card, 11, RATE, 0x01000000);
+    return card;
+}
+
+static void version_c2_latches_the_position_once_at_a_filtered_rising_index(void **state)
+{
+    (void)state;
+    struct sim_card *const card = new_c2();
+    uint32_t undriven = 0;
+    sim_card_write(card, 600, MODE, 0x30); /* latch on index, rising */
+    assert_int_equal(sim_card_drive_input(card, 1000, HM2_GTAG_STEPGEN, 0, INDEX_PIN, SIM_HIGH), 0);
+    assert_int_equal(sim_card_drive_input(card, 1200, HM2_GTAG_STEPGEN, 0, INDEX_PIN, SIM_LOW), 0); /* too short */
+    assert_int_equal(sim_card_read(card, 2000, MODE, &undriven), 0x00000030);
+    assert_int_equal(undriven, 0);
+    assert_int_equal(sim_card_drive_input(card, 3000, HM2_GTAG_STEPGEN, 0, INDEX_PIN, SIM_HIGH), 0);
+    /* Edges 3001 to 3255 count to 255; 3256 settles, 3257 latches what the edges before it made. */
+    sim_card_advance(card, 3257);
+    const uint32_t at_latch = (uint32_t)(sim_stepgen_position(card, 0) >> 16);
+    assert_int_equal(sim_card_read(card, 3257, MODE, NULL), 0x00000030);
+    assert_int_equal(sim_card_read(card, 3258, MODE, NULL), (at_latch & 0xFFFFFF00) | 0x20);
+    assert_int_equal(sim_card_read(card, 9000, MODE, NULL), (at_latch & 0xFFFFFF00) | 0x20);
+    sim_card_free(card);
+}
+
+static void one_probe_latches_every_generator_that_is_armed(void **state)
+{
+    (void)state;
+    struct sim_card *const card = new_c2();
+    sim_card_write(card, 12, RATE + 4, 0x02000000);
+    assert_int_equal(sim_card_drive_input(card, 20, HM2_GTAG_STEPGEN, 0, PROBE_PIN, SIM_HIGH), 0);
+    sim_card_write(card, 900, MODE, 0x40); /* falling */
+    sim_card_write(card, 901, MODE + 4, 0x40);
+    assert_int_equal(sim_card_drive_input(card, 1000, HM2_GTAG_STEPGEN, 0, PROBE_PIN, SIM_LOW), 0);
+    sim_card_advance(card, 1257);
+    const uint32_t first = (uint32_t)(sim_stepgen_position(card, 0) >> 16) & 0xFFFFFF00;
+    const uint32_t second = (uint32_t)(sim_stepgen_position(card, 1) >> 16) & 0xFFFFFF00;
+    assert_int_equal(sim_card_read(card, 5000, MODE, NULL), first);
+    assert_int_equal(sim_card_read(card, 5001, MODE + 4, NULL), second);
+    assert_int_equal(sim_card_read(card, 5002, MODE + 8, NULL), 0);
+    sim_card_free(card);
+}
+
+static void version_c2_swaps_the_outputs(void **state)
+{
+    (void)state;
+    struct sim_card *const card = new_c2();
+    sim_card_write(card, 20, RATE, 0xFFFFFFFF); /* backwards, too slow to make a step here */
+    sim_card_advance(card, 30);
+    struct sim_module *const m = sim_find(card, HM2_GTAG_STEPGEN);
+    assert_int_equal(m->ops->output(m, 0, 0x82), SIM_HIGH);
+    sim_card_write(card, 40, MODE, 0x04);
+    assert_int_equal(m->ops->output(m, 0, 0x82), SIM_LOW);
+    assert_int_equal(m->ops->output(m, 0, 0x81), SIM_HIGH);
+    sim_card_free(card);
+}
+
 /* ---- 64-bit position for followers --------------------------------------------------------------------------------
  */
 
@@ -293,6 +398,10 @@ int main(void)
         cmocka_unit_test(a_saturated_second_keeps_the_period_of_the_timers),
         cmocka_unit_test(a_latched_position_is_that_of_the_edge_after_the_timer_rose),
         cmocka_unit_test(the_select_register_is_not_there_without_a_dpll),
+        cmocka_unit_test(a_filter_run_in_closed_form_equals_the_same_run_clock_by_clock),
+        cmocka_unit_test(version_c2_latches_the_position_once_at_a_filtered_rising_index),
+        cmocka_unit_test(one_probe_latches_every_generator_that_is_armed),
+        cmocka_unit_test(version_c2_swaps_the_outputs),
         cmocka_unit_test(the_followers_position_goes_on_where_the_register_wraps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
