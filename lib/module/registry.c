@@ -1,10 +1,25 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Every module type of this library. The order is that of the work inside a cycle (hal-interface 3.8): the watchdog
- * tells first whether the card still drives its outputs, then come ports and counters, and the DPLL last.
+ * Every module type of this library. The watchdog comes first, it tells whether the card still drives its outputs;
+ * ports come behind all types that claim pins; raw access has no descriptor and comes last.
  */
 #include "module_types.h"
 
+/* clang-format off */
 const struct hm2_module_type *const hm2_module_types[] = {
-    &hm2_encoder_type, &hm2_muxed_encoder_type, &hm2_pwmgen_type, &hm2_stepgen_type, NULL,
+    &hm2_watchdog_type,
+    &hm2_encoder_type,
+    &hm2_muxed_encoder_type,
+    &hm2_pwmgen_type,
+    &hm2_stepgen_type,
+    &hm2_inmux_type,
+    &hm2_inm_type,
+    &hm2_ssr_type,
+    &hm2_outm_type,
+    &hm2_dpll_type,
+    &hm2_led_type,
+    &hm2_ioport_type,
+    &hm2_raw_type,
+    NULL,
 };
+/* clang-format on */

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Showing many input levels cheaply. Private to lib/module. */
+#ifndef HM2_MODULE_LEVELS_H
+#define HM2_MODULE_LEVELS_H
+
+#include <hm2/points.h>
+
+/* Two pins for one level. */
+struct hm2_level {
+    hm2_bit_t *level, *inverse;
+};
+
+/* Write the pins of those bits of word that are set in which; levels[0] belongs to bit 0. */
+static inline void hm2_show_levels(const struct hm2_level *const levels, const uint32_t word, uint32_t which)
+{
+    for (; which; which &= which - 1) {
+        const unsigned bit = (unsigned)__builtin_ctz(which);
+        const bool level = word >> bit & 1u;
+        *levels[bit].level = level;
+        *levels[bit].inverse = !level;
+    }
+}
+
+/*
+ * Taking turns. A pin is written when its level changed, and otherwise once in a few cycles: a host may link a pin to a
+ * signal at any time, and the signal shall soon show the level even if that never changes. The same turns serve for
+ * looking at parameters, which only a person changes.
+ */
+#define HM2_TURN_BITS       12u
+#define HM2_TURNS_PER_WORD  3u /* 3 * 12 bits cover a word */
+#define HM2_TURN_MASK(turn) ((uint32_t)((((uint64_t)1 << HM2_TURN_BITS) - 1u) << HM2_TURN_BITS * (turn)))
+
+/* Turns that a word of this width needs. */
+static inline unsigned hm2_turns(const unsigned width)
+{
+    return (width + HM2_TURN_BITS - 1u) / HM2_TURN_BITS;
+}
+
+#endif

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Numbered outputs of SSR and OutM: a value and an inversion for each described pin. Private to lib/module. */
+#ifndef HM2_MODULE_OUTPUTS_H
+#define HM2_MODULE_OUTPUTS_H
+
+#include <hm2/module.h>
+
+#define HM2_OUTPUTS 32u /* bits of the data register */
+
+struct hm2_output {
+    hm2_bit_t *out, *invert;
+};
+
+/* Outputs of one instance that have a pin descriptor, by rising number. */
+struct hm2_outputs {
+    unsigned count;
+    uint8_t bit[HM2_OUTPUTS];
+    struct hm2_output output[HM2_OUTPUTS];
+};
+
+#define HM2_OUTPUT_ROWS 2u
+extern const struct hm2_point hm2_output_points[HM2_OUTPUT_ROWS];
+
+/* Find the outputs of an instance among the pin descriptors, up to output number last, and create their pins with the
+ * group's prefix ("ssr.##"). */
+int HM2_MUST_CHECK hm2_outputs_bind(struct hm2_outputs *outputs, const struct hm2_module *module,
+                                    const struct hm2_setup *setup, const struct hm2_point_group *group, unsigned unit,
+                                    unsigned last);
+
+/* Data word: out xor invert (hal-interface 2.12). */
+static inline uint32_t hm2_outputs_word(const struct hm2_outputs *const outputs)
+{
+    uint32_t word = 0;
+    for (unsigned i = 0; i < outputs->count; i++)
+        word |= (uint32_t)(*outputs->output[i].out != *outputs->output[i].invert) << outputs->bit[i];
+    return word;
+}
+
+#endif
