@@ -49,6 +49,11 @@ bool board_notices_is_new(struct board_notices *const notices, const struct hm2_
     return true;
 }
 
+static uint32_t microseconds(const int64_t ns)
+{
+    return ns < 0 ? 0 : ns / 1000 > UINT32_MAX ? UINT32_MAX : (uint32_t)(ns / 1000);
+}
+
 void hm2_notice(const struct hm2_module *const module, const enum hm2_notice notice, const unsigned instance,
                 const double value)
 {
@@ -56,7 +61,28 @@ void hm2_notice(const struct hm2_module *const module, const enum hm2_notice not
         module->noticed[notice]++;
     if (!module->board)
         return;
-    struct board_notices *const notices = &module->board->notices;
-    if (board_notices_is_new(notices, module, (int)notice, instance))
-        (void)board_notices_push(notices, &(struct board_event){module, (int)notice, instance, value});
+    struct hm2_board *const board = module->board;
+    if (!board_notices_is_new(&board->notices, module, (int)notice, instance))
+        return;
+    struct board_event event = {.module = module, .kind = (int)notice, .instance = instance, .value = value};
+    if (notice == HM2_NOTICE_WATCHDOG_BIT) {
+        event.words[BOARD_BITE_REASON] = board_bite_reason(board);
+        event.words[BOARD_BITE_GAP_US] = microseconds(board->write_gap_ns);
+        event.words[BOARD_BITE_PERIOD_US] = microseconds(board->period_ns);
+    }
+    (void)board_notices_push(&board->notices, &event);
+}
+
+void board_event(struct hm2_board *const board, const enum board_event_kind kind, const struct board_event *const facts)
+{
+    struct board_notices *const notices = &board->notices;
+    const bool known = board->event_seen[kind] && notices->now_ns - board->event_ns[kind] <= NOTICE_ABSENT_NS;
+    board->event_seen[kind] = true;
+    board->event_ns[kind] = notices->now_ns;
+    if (known)
+        return;
+    struct board_event event = *facts;
+    event.module = NULL;
+    event.kind = (int)kind;
+    (void)board_notices_push(notices, &event);
 }

@@ -13,6 +13,7 @@
 #define NOTICE_RING_SIZE   64u /* a power of two: the ring's positions run freely and wrap */
 #define NOTICE_ACTIVE_SIZE 64u /* conditions remembered as present, a power of two */
 #define NOTICE_ACTIVE_WAYS 4u  /* places in which one condition may stand */
+#define NOTICE_WORDS       8u
 /* A condition that was absent for this long is reported anew when it comes back. */
 #define NOTICE_ABSENT_NS 1000000000
 
@@ -21,6 +22,7 @@ struct board_event {
     int kind;                        /* enum hm2_notice, or enum board_event_kind when module is NULL */
     unsigned instance;
     double value;
+    uint32_t words[NOTICE_WORDS]; /* facts that belong to the kind */
 };
 
 struct notice_active {

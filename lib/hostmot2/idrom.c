@@ -76,12 +76,19 @@ static void check_id(struct parse *const p)
         VIOLATION(p, "%s: config name (registers 0x0104, 0x0108) is \"%s\" (0x%08X 0x%08X), expected \"HOSTMOT2\"",
                   p->board, found, (unsigned)id[1], (unsigned)id[2]);
     }
-    const uint32_t pointer = id[3] & 0xFFFFu;
-    if (pointer % 4u != 0 || pointer <= HM2_ADDR_IDROM_POINTER || pointer > ADDRESS_SPACE - ROM_BYTES)
+}
+
+/* Without a possible pointer there is no ROM: its words would be anything. */
+static bool check_pointer(struct parse *const p)
+{
+    const uint32_t pointer = p->image->id[3] & 0xFFFFu;
+    const bool ok = pointer % 4u == 0 && pointer > HM2_ADDR_IDROM_POINTER && pointer <= ADDRESS_SPACE - ROM_BYTES;
+    if (!ok)
         VIOLATION(p,
                   "%s: IDROM pointer (register 0x010C) is 0x%04X, expected a multiple of 4 from 0x0110 to 0xFC00 "
                   "(normally 0x0400)",
                   p->board, (unsigned)pointer);
+    return ok;
 }
 
 /* ---- header ----------------------------------------------------------------------------------------------------- */
@@ -353,11 +360,13 @@ int hm2_idrom_parse(const struct hm2_image *const image, const struct hm2_idrom_
     memset(out, 0, sizeof *out);
     out->fingerprint = hm2_image_fingerprint(image);
     check_id(&p);
-    parse_header(&p);
-    if (offset_ok(out->offset_modules))
-        parse_modules(&p);
-    if (offset_ok(out->offset_pins))
-        parse_pins(&p);
+    if (check_pointer(&p)) {
+        parse_header(&p);
+        if (offset_ok(out->offset_modules))
+            parse_modules(&p);
+        if (offset_ok(out->offset_pins))
+            parse_pins(&p);
+    }
     return p.bad ? HM2_ERR_MISMATCH : 0;
 }
 

@@ -79,6 +79,12 @@ bool hm2_section_confirmed(const struct hm2_section *const section)
     return in_state(section->plan, section->number, PLAN_CLEAN);
 }
 
+bool hm2_plan_settled(const struct hm2_plan *const plan)
+{
+    return plan->session_state == PLAN_CLEAN && is_empty(&plan->in_state[PLAN_DIRTY]) &&
+           is_empty(&plan->in_state[PLAN_FLYING]);
+}
+
 void hm2_plan_touch_all(struct hm2_plan *const plan)
 {
     plan->session_state = PLAN_DIRTY;

@@ -4,7 +4,7 @@
 #include "board_private.h"
 
 struct fixture {
-    struct hm2_board board;
+    struct hm2_board *board;
     struct hm2_module module;
     uint32_t noticed[HM2_NOTICES];
 };
@@ -13,7 +13,9 @@ static struct fixture *new_fixture(void)
 {
     struct fixture *const f = calloc(1, sizeof *f);
     assert_non_null(f);
-    f->module.board = &f->board;
+    f->board = hm2_board_new();
+    assert_non_null(f->board);
+    f->module.board = f->board;
     f->module.noticed = f->noticed;
     return f;
 }
@@ -36,21 +38,22 @@ static void a_condition_is_reported_once_until_it_was_absent(void **state)
     struct fixture *const f = new_fixture();
     struct board_event event;
     for (int i = 0; i < 5000; i++) {
-        f->board.notices.now_ns += 1000000;
+        f->board->notices.now_ns += 1000000;
         hm2_notice(&f->module, HM2_NOTICE_VALUE_CLAMPED, 2, 0.5 + i);
     }
-    assert_true(board_notices_pop(&f->board.notices, &event));
+    assert_true(board_notices_pop(&f->board->notices, &event));
     assert_ptr_equal(event.module, &f->module);
     assert_int_equal(event.kind, HM2_NOTICE_VALUE_CLAMPED);
     assert_int_equal(event.instance, 2);
     assert_true(event.value == 0.5);
-    assert_false(board_notices_pop(&f->board.notices, &event));
+    assert_false(board_notices_pop(&f->board->notices, &event));
 
-    f->board.notices.now_ns += NOTICE_ABSENT_NS + 1;
+    f->board->notices.now_ns += NOTICE_ABSENT_NS + 1;
     hm2_notice(&f->module, HM2_NOTICE_VALUE_CLAMPED, 2, 9.0);
-    assert_true(board_notices_pop(&f->board.notices, &event));
+    assert_true(board_notices_pop(&f->board->notices, &event));
     assert_true(event.value == 9.0);
     assert_int_equal(f->noticed[HM2_NOTICE_VALUE_CLAMPED], 5001);
+    hm2_board_free(f->board);
     free(f);
 }
 
@@ -65,9 +68,10 @@ static void different_conditions_are_reported_each(void **state)
     hm2_notice(&f->module, HM2_NOTICE_VALUE_INVALID, 0, 0);
     hm2_notice(&other, HM2_NOTICE_VALUE_CLAMPED, 0, 0);
     unsigned count = 0;
-    while (board_notices_pop(&f->board.notices, &event))
+    while (board_notices_pop(&f->board->notices, &event))
         count++;
     assert_int_equal(count, 4);
+    hm2_board_free(f->board);
     free(f);
 }
 
@@ -76,18 +80,19 @@ static void a_full_ring_counts_what_it_drops_and_keeps_the_oldest(void **state)
     (void)state;
     struct fixture *const f = new_fixture();
     struct board_event event = {.module = &f->module};
-    atomic_store(&f->board.notices.produced, UINT32_MAX - 5); /* the positions wrap on the way */
-    atomic_store(&f->board.notices.consumed, UINT32_MAX - 5);
+    atomic_store(&f->board->notices.produced, UINT32_MAX - 5); /* the positions wrap on the way */
+    atomic_store(&f->board->notices.consumed, UINT32_MAX - 5);
     for (unsigned i = 0; i < NOTICE_RING_SIZE + 10; i++) {
         event.instance = i;
-        assert_int_equal(board_notices_push(&f->board.notices, &event), i < NOTICE_RING_SIZE);
+        assert_int_equal(board_notices_push(&f->board->notices, &event), i < NOTICE_RING_SIZE);
     }
-    assert_int_equal(atomic_load(&f->board.notices.overflows), 10);
+    assert_int_equal(atomic_load(&f->board->notices.overflows), 10);
     for (unsigned i = 0; i < NOTICE_RING_SIZE; i++) {
-        assert_true(board_notices_pop(&f->board.notices, &event));
+        assert_true(board_notices_pop(&f->board->notices, &event));
         assert_int_equal(event.instance, i);
     }
-    assert_false(board_notices_pop(&f->board.notices, &event));
+    assert_false(board_notices_pop(&f->board->notices, &event));
+    hm2_board_free(f->board);
     free(f);
 }
 

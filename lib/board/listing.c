@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The pins of a card with their terminals and owners, as printed at load. */
+#include <stdio.h>
+
+#include "board_private.h"
+
+static void terminal(const struct hm2_board *const board, const unsigned io, char *const text, const size_t size)
+{
+    const struct hm2_board_type *const type = &board->type;
+    const unsigned width = board->idrom.port_width;
+    const unsigned port = width ? io / width : 0;
+    const unsigned connectors = sizeof type->connectors / sizeof type->connectors[0];
+    if (type->terminals && io < type->io_ports * type->port_width)
+        (void)snprintf(text, size, "%s", type->terminals[io]);
+    else
+        (void)snprintf(text, size, "%s-%02u",
+                       port < connectors && type->connectors[port] ? type->connectors[port] : "??",
+                       hm2_connector_pin(width, io));
+}
+
+static int describe(const struct hm2_board *const board, const unsigned io, char *const text, const size_t size)
+{
+    const struct hm2_pin *const pin = &board->pins[io];
+    const struct hm2_pd *const pd = &pin->pd;
+    char place[32], function[32];
+    terminal(board, io, place, sizeof place);
+    if (!pin->owner)
+        return snprintf(text, size, "IO Pin %03u (%s): IOPort\n", io, place);
+    const char *const name = hm2_pin_function(pd, function, sizeof function);
+    const char *const direction = pd->secondary_pin & HM2_PIN_OUTPUT ? "Output" : "Input";
+    if (pd->secondary_unit & HM2_UNIT_GLOBAL)
+        return snprintf(text, size, "IO Pin %03u (%s): %s (all), pin %s (%s)\n", io, place,
+                        hm2_tag_name(pd->secondary_tag), name, direction);
+    return snprintf(text, size, "IO Pin %03u (%s): %s #%u, pin %s (%s)\n", io, place, hm2_tag_name(pd->secondary_tag),
+                    pd->secondary_unit, name, direction);
+}
+
+size_t hm2_board_describe_pins(const struct hm2_board *const board, char *const text, const size_t size)
+{
+    size_t used = 0;
+    if (size > 0)
+        text[0] = '\0';
+    for (unsigned io = 0; io < board->idrom.pin_count; io++) {
+        const int len = used < size ? describe(board, io, text + used, size - used) : describe(board, io, NULL, 0);
+        used += len > 0 ? (size_t)len : 0;
+    }
+    return used;
+}

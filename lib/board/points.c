@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Points of the board itself: those of hal-interface 2.1, and counters by cause and round-trip times beside them. */
+#include "board_private.h"
+
+#define P(field, name, type, dir, init, unit, help) \
+    HM2_POINT(struct board_points, field, name, type, dir, init, unit, help)
+
+static const struct hm2_point points[] = {
+    P(io_error, "io_error", HM2_BIT, HM2_PARAM_RW, 0, "",
+      "1 = too many failed cycles, or other firmware: nothing is sent; set to 0 to resume"),
+    P(read_timeout, "packet-read-timeout", HM2_S32, HM2_PARAM_RW, 80, "% or ns",
+      "time after the request to wait for the reply: below 100 percent of the period, else ns; at least 100 us"),
+    P(error_limit, "packet-error-limit", HM2_S32, HM2_PARAM_RW, 10, "", "level at which io_error is raised"),
+    P(error_increment, "packet-error-increment", HM2_S32, HM2_PARAM_RW, 2, "", "added to the level by a failed cycle"),
+    P(error_decrement, "packet-error-decrement", HM2_S32, HM2_PARAM_RW, 1, "", "taken from the level by a good cycle"),
+    P(error, "packet-error", HM2_BIT, HM2_PIN_OUT, 0, "", "this cycle failed"),
+    P(error_total, "packet-error-total", HM2_U32, HM2_PIN_IO, 0, "cycles", "failed cycles; may be set to 0"),
+    P(error_level, "packet-error-level", HM2_S32, HM2_PIN_OUT, 0, "", "rises with failed cycles, falls with good ones"),
+    P(error_exceeded, "packet-error-exceeded", HM2_BIT, HM2_PIN_OUT, 0, "", "the level has reached its limit"),
+    P(lost, "packet-lost", HM2_U32, HM2_PIN_OUT, 0, "cycles", "cycles without a good reply before the deadline"),
+    P(late, "packet-late", HM2_U32, HM2_PIN_OUT, 0, "packets", "replies that came after their cycle had given them up"),
+    P(stale, "packet-stale", HM2_U32, HM2_PIN_OUT, 0, "packets", "replies that came once more"),
+    P(malformed, "packet-malformed", HM2_U32, HM2_PIN_OUT, 0, "packets", "replies of wrong length or to no request"),
+    P(strangers, "packet-strangers", HM2_U32, HM2_PIN_OUT, 0, "packets", "datagrams that did not come from the card"),
+    P(write_lost, "write-lost", HM2_U32, HM2_PIN_OUT, 0, "packets", "writes that the card did not receive"),
+    P(data_age, "data-age", HM2_U32, HM2_PIN_OUT, 0, "cycles", "cycles since the inputs were updated; 0 = this one"),
+    P(rtt_min_us, "rtt-min-us", HM2_FLOAT, HM2_PIN_OUT, 0, "us", "shortest time from request to reply"),
+    P(rtt_us, "rtt-us", HM2_FLOAT, HM2_PIN_OUT, 0, "us", "time from request to reply, last cycle"),
+    P(rtt_max_us, "rtt-max-us", HM2_FLOAT, HM2_PIN_OUT, 0, "us", "longest time from request to reply"),
+    P(rtt_reset, "rtt-reset", HM2_BIT, HM2_PIN_IO, 0, "", "set to 1 to start the shortest and longest anew"),
+};
+
+const struct hm2_point_group board_point_groups[] = {
+    {"", points, sizeof points / sizeof points[0], NULL},
+    {NULL, NULL, 0, NULL},
+};
+
+int board_points_bind(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
+{
+    board->points = binder->alloc(binder, sizeof *board->points);
+    if (!board->points)
+        return hm2_diag_add(diag, HM2_ERR_NOMEM, "%s: the host gave no memory for the board's points", board->prefix);
+    return hm2_bind_points(binder, points, sizeof points / sizeof points[0], board->points, board->prefix, 0, diag);
+}
