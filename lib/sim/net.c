@@ -10,6 +10,7 @@
 #define ON_THE_WAY   64u
 #define INBOX        64u
 #define MAX_DELAY_NS 1000000000
+#define LONG_WORK_NS 200000   /* a full packet takes 150 us: more than this was asked for */
 #define HOLD_NS      10000000 /* a datagram held back for the next to overtake goes on after this */
 
 enum direction { TO_CARD, TO_CLIENT };
@@ -18,6 +19,7 @@ struct datagram {
     int64_t due_ns;
     uint64_t order; /* of queuing; breaks ties */
     uint64_t number;
+    uint64_t client; /* who sent it, or gets it */
     enum direction direction;
     bool copy, held, foreign;
     size_t len;
@@ -30,7 +32,10 @@ struct sim_net {
     struct sim_faults faults;
     uint64_t random;
     int64_t now_ns;
-    bool frozen;
+    bool frozen, instant;
+    uint64_t client; /* of the datagram that is being carried */
+    sim_net_deliver_fn deliver;
+    void *deliver_context;
 
     struct datagram pool[ON_THE_WAY];
     unsigned waiting[ON_THE_WAY]; /* pool indices: the first waiting_count are on their way, the rest free */
@@ -71,6 +76,7 @@ static struct datagram *enqueue(struct sim_net *const net, const enum direction 
     d->due_ns = due_ns;
     d->order = net->queued++;
     d->number = net->number[direction];
+    d->client = net->client;
     d->direction = direction;
     d->copy = d->held = d->foreign = false;
     d->len = len;
@@ -147,6 +153,11 @@ static void carry(struct sim_net *const net, const enum direction direction, con
 
 static void to_client(struct sim_net *const net, const struct datagram *const d)
 {
+    if (net->deliver) {
+        net->truth.delivered[TO_CLIENT] += !d->foreign;
+        net->deliver(net->deliver_context, d->client, d->data, d->len, d->foreign);
+        return;
+    }
     if (d->foreign) {
         net->link.counters.strangers++;
         return;
@@ -172,8 +183,10 @@ static void to_card(struct sim_net *const net, const struct datagram *const d)
     if (!d->foreign)
         net->truth.delivered[TO_CARD]++;
     const size_t len = sim_card_packet(net->card, net->now_ns, d->data, d->len, reply, sizeof reply, &reply_ns);
+    const bool at_once = net->instant && reply_ns - net->now_ns < LONG_WORK_NS;
+    net->client = d->client;
     if (len > 0 && !d->foreign)
-        carry(net, TO_CLIENT, reply_ns, reply, len);
+        carry(net, TO_CLIENT, at_once ? net->now_ns : reply_ns, reply, len);
 }
 
 /* Index in waiting[] of the datagram that is due next, waiting_count when there is none. */
@@ -334,6 +347,33 @@ void sim_net_free(struct sim_net *const net)
 struct link *sim_net_link(struct sim_net *const net)
 {
     return &net->link;
+}
+
+void sim_net_on_deliver(struct sim_net *const net, const sim_net_deliver_fn fn, void *const context)
+{
+    net->deliver = fn;
+    net->deliver_context = context;
+}
+
+void sim_net_arrive(struct sim_net *const net, const int64_t now_ns, const uint64_t client, const uint8_t *const data,
+                    const size_t len)
+{
+    sim_net_sleep_until(net, now_ns);
+    net->client = client;
+    if (len <= LINK_MAX_DATAGRAM_BYTES)
+        carry(net, TO_CARD, net->now_ns, data, len);
+    sim_net_sleep_until(net, now_ns);
+}
+
+int64_t sim_net_next_ns(const struct sim_net *const net)
+{
+    const unsigned next = due_next(net);
+    return next < net->waiting_count ? net->pool[net->waiting[next]].due_ns : INT64_MAX;
+}
+
+void sim_net_set_instant(struct sim_net *const net, const bool instant)
+{
+    net->instant = instant;
 }
 
 void sim_net_sleep_until(struct sim_net *const net, const int64_t now_ns)

@@ -142,4 +142,16 @@ struct sim_net_truth {
 };
 HM2_API struct sim_net_truth sim_net_truth(const struct sim_net *net);
 
+/* The same network for clients outside, by number: what is delivered goes to a function instead of the link. A
+ * program calls sim_net_arrive() when a client's datagram came, sim_net_sleep_until() when its own time has come to
+ * sim_net_next_ns(), and sends what it is handed. */
+typedef void (*sim_net_deliver_fn)(void *context, uint64_t client, const uint8_t *data, size_t len, bool foreign);
+HM2_API void sim_net_on_deliver(struct sim_net *net, sim_net_deliver_fn fn, void *context);
+HM2_API void sim_net_arrive(struct sim_net *net, int64_t now_ns, uint64_t client, const uint8_t *data, size_t len);
+/* When the next datagram on its way is due; INT64_MAX when there is none. */
+HM2_API int64_t sim_net_next_ns(const struct sim_net *net);
+/* Replies leave as soon as they are made, without the tens of microseconds that the card takes (not so when a packet
+ * asked the card to wait). For programs, whose host adds times of its own. */
+HM2_API void sim_net_set_instant(struct sim_net *net, bool instant);
+
 #endif

@@ -1,0 +1,493 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "options.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <getopt.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <hm2/lbp16.h>
+
+#define NS_PER_S              1e9
+#define NS_PER_MS             1e6
+#define NS_PER_US             1e3
+#define MAX_SECONDS           1e6
+#define DEFAULT_PRIORITY      50
+#define ADDRESS_CHARACTERS    32
+#define MAX_PATTERN_PERIOD_MS 1e6
+
+/* ---- numbers ------------------------------------------------------------------------------------------------------
+ */
+
+static bool read_unsigned(const char *const text, const unsigned long max, const char **const end,
+                          unsigned long *const value)
+{
+    if (*text < '0' || *text > '9')
+        return false;
+    char *stop;
+    errno = 0;
+    *value = strtoul(text, &stop, 10);
+    *end = stop;
+    return errno == 0 && *value <= max;
+}
+
+static bool whole_unsigned(const char *const text, const unsigned long max, unsigned long *const value)
+{
+    const char *end;
+    return read_unsigned(text, max, &end, value) && *end == '\0';
+}
+
+static bool read_real(const char *const text, const double min, const double max, const char **const end,
+                      double *const value)
+{
+    char *stop;
+    *value = strtod(text, &stop);
+    *end = stop;
+    return stop != text && isfinite(*value) && *value >= min && *value <= max;
+}
+
+static bool whole_real(const char *const text, const double min, const double max, double *const value)
+{
+    const char *end;
+    return read_real(text, min, max, &end, value) && *end == '\0';
+}
+
+/* ---- single options -----------------------------------------------------------------------------------------------
+ */
+
+/* The options of a card stand behind its --card; those before the first one hold for every card. */
+struct reading {
+    struct options *options;
+    struct card_options shared;
+    struct card_options *card; /* that the next option is for */
+    struct in_addr bind;
+    uint16_t port;
+    bool own_address[MAX_CARDS];
+    struct hm2_diag diag;
+};
+
+static int refuse(struct reading *const r, const char *const option, const char *const value, const char *const wanted)
+{
+    return hm2_diag_add(&r->diag, HM2_ERR_INVALID, "%s \"%s\": expected %s", option, value, wanted);
+}
+
+static int set_address(struct reading *const r, const char *const value)
+{
+    if (inet_pton(AF_INET, value, &r->bind) != 1)
+        return refuse(r, "--bind", value, "an IPv4 address such as 127.0.0.1");
+    return 0;
+}
+
+static int set_port(struct reading *const r, const char *const value)
+{
+    unsigned long port;
+    if (!whole_unsigned(value, UINT16_MAX, &port))
+        return refuse(r, "--port", value, "a port number, 0 to 65535 (0 = any free one)");
+    r->port = (uint16_t)port;
+    return 0;
+}
+
+static bool known_type(const char *const name, const size_t len, const char **const type)
+{
+    for (const char *const *known = sim_profiles(); *known; known++) {
+        if (strncmp(*known, name, len) == 0 && (*known)[len] == '\0') {
+            *type = *known;
+            return true;
+        }
+    }
+    return false;
+}
+
+/* TYPE[@ADDRESS[:PORT]] */
+static int add_card(struct reading *const r, const char *const value)
+{
+    struct options *const o = r->options;
+    const size_t type_len = strcspn(value, "@");
+    if (o->card_count == MAX_CARDS)
+        return refuse(r, "--card", value, "at most 32 cards");
+    struct card_options card = r->shared;
+    if (!known_type(value, type_len, &card.type))
+        return refuse(r, "--card", value, "TYPE[@ADDRESS[:PORT]] with a type that hm2sim --help lists");
+    if (value[type_len] == '@') {
+        char address[ADDRESS_CHARACTERS];
+        const char *const start = value + type_len + 1;
+        const size_t address_len = strcspn(start, ":");
+        unsigned long port = LBP16_UDP_PORT;
+        if (address_len >= sizeof address)
+            return refuse(r, "--card", value, "an IPv4 address behind the @");
+        memcpy(address, start, address_len);
+        address[address_len] = '\0';
+        if (inet_pton(AF_INET, address, &card.address) != 1)
+            return refuse(r, "--card", value, "an IPv4 address behind the @");
+        if (start[address_len] == ':' && !whole_unsigned(start + address_len + 1, UINT16_MAX, &port))
+            return refuse(r, "--card", value, "a port number behind the colon");
+        card.port = (uint16_t)port;
+        r->own_address[o->card_count] = true;
+    }
+    r->card = &o->cards[o->card_count++];
+    *r->card = card;
+    return 0;
+}
+
+static int set_mac(struct reading *const r, const char *const value)
+{
+    unsigned b[6];
+    int used = 0;
+    if (sscanf(value, "%2x:%2x:%2x:%2x:%2x:%2x%n", &b[0], &b[1], &b[2], &b[3], &b[4], &b[5], &used) != 6 ||
+        value[used] != '\0')
+        return refuse(r, "--mac", value, "six bytes such as 00:60:1b:12:34:56");
+    for (unsigned i = 0; i < 6; i++)
+        r->card->mac[i] = (uint8_t)b[i];
+    return 0;
+}
+
+static int add_wire(struct reading *const r, const char *const value)
+{
+    unsigned long from, to;
+    const char *end;
+    if (!read_unsigned(value, HM2_MAX_PINS, &end, &from) || *end != ':' || !whole_unsigned(end + 1, HM2_MAX_PINS, &to))
+        return refuse(r, "--wire", value, "FROM:TO, two I/O numbers");
+    if (r->card->wire_count == MAX_WIRES)
+        return refuse(r, "--wire", value, "at most 32 wires a card");
+    r->card->wires[r->card->wire_count++] = (struct wire){(unsigned)from, (unsigned)to};
+    return 0;
+}
+
+static bool read_ratio(const char *const text, struct follower *const f)
+{
+    unsigned long num, den = 1;
+    const char *end;
+    const bool backwards = *text == '-';
+    if (!read_unsigned(text + backwards, INT32_MAX, &end, &num))
+        return false;
+    if (*end == '/' && (!whole_unsigned(end + 1, INT32_MAX, &den) || den == 0))
+        return false;
+    if (*end != '/' && *end != '\0')
+        return false;
+    f->num = backwards ? -(int32_t)num : (int32_t)num;
+    f->den = (int32_t)den;
+    return true;
+}
+
+static int add_follower(struct reading *const r, const char *const value)
+{
+    static const char wanted[] = "ENCODER:STEPGEN or ENCODER:STEPGEN:NUM/DEN";
+    unsigned long encoder, stepgen;
+    const char *end;
+    struct follower f = {.num = 1, .den = 1};
+    if (!read_unsigned(value, UINT8_MAX, &end, &encoder) || *end != ':' ||
+        !read_unsigned(end + 1, UINT8_MAX, &end, &stepgen))
+        return refuse(r, "--follow", value, wanted);
+    if (*end != '\0' && (*end != ':' || !read_ratio(end + 1, &f)))
+        return refuse(r, "--follow", value, wanted);
+    if (r->card->follower_count == MAX_WIRES)
+        return refuse(r, "--follow", value, "at most 32 followers a card");
+    f.encoder = (unsigned)encoder;
+    f.stepgen = (unsigned)stepgen;
+    r->card->followers[r->card->follower_count++] = f;
+    return 0;
+}
+
+bool options_level(const char letter, enum sim_level *const level)
+{
+    static const char letters[] = "01zh";
+    static const enum sim_level levels[] = {SIM_LOW, SIM_HIGH, SIM_FLOAT, SIM_PULLUP};
+    const char *const at = letter ? strchr(letters, letter) : NULL;
+    if (!at)
+        return false;
+    *level = levels[at - letters];
+    return true;
+}
+
+/* IO:LEVELS[:MS] */
+static int add_pattern(struct reading *const r, const char *const value)
+{
+    static const char wanted[] = "IO:LEVELS[:MILLISECONDS], levels being 0, 1, z, h";
+    unsigned long io;
+    const char *at;
+    struct pattern p = {.step_ns = 0};
+    if (r->card->pattern_count == MAX_PATTERNS)
+        return refuse(r, "--drive", value, "at most 32 driven pads a card");
+    if (!read_unsigned(value, HM2_MAX_PINS, &at, &io) || *at != ':')
+        return refuse(r, "--drive", value, wanted);
+    p.io = (unsigned)io;
+    for (at++; *at && *at != ':'; at++)
+        if (p.count == PATTERN_BITS || !options_level(*at, &p.levels[p.count++]))
+            return refuse(r, "--drive", value, wanted);
+    double ms = 0;
+    if (*at == ':' && !whole_real(at + 1, 0.1, MAX_PATTERN_PERIOD_MS, &ms))
+        return refuse(r, "--drive", value, "0.1 to 1e6 milliseconds for each level");
+    if (p.count == 0 || (p.count > 1 && ms <= 0))
+        return refuse(r, "--drive", value, wanted);
+    p.step_ns = (int64_t)(ms * NS_PER_MS);
+    r->card->patterns[r->card->pattern_count++] = p;
+    return 0;
+}
+
+/* ---- faults -------------------------------------------------------------------------------------------------------
+ */
+
+/* "US" or "US-US" */
+static bool read_delay(const char *const text, const char **const end, struct sim_faults *const faults)
+{
+    double min, max;
+    if (!read_real(text, 0, 1e6, end, &min))
+        return false;
+    max = min;
+    if (**end == '-' && !read_real(*end + 1, min, 1e6, end, &max))
+        return false;
+    faults->delay_min_ns = (int64_t)(min * NS_PER_US);
+    faults->delay_max_ns = (int64_t)(max * NS_PER_US);
+    return true;
+}
+
+int options_faults(const char *text, struct sim_faults *const faults, struct hm2_diag *const diag)
+{
+    static const char wanted[] =
+        "loss, dup, reorder, truncate, foreign = 0..1 and delay = MICROSECONDS[-MICROSECONDS], "
+        "separated by commas, or none";
+    struct sim_faults f = {.seed = faults->seed};
+    const struct {
+        const char *name;
+        double *probability;
+    } names[] = {{"loss=", &f.loss},
+                 {"dup=", &f.duplicate},
+                 {"reorder=", &f.reorder},
+                 {"truncate=", &f.truncate},
+                 {"foreign=", &f.foreign}};
+    const char *const all = text;
+    if (strcmp(text, "none") == 0)
+        text = "";
+    while (*text) {
+        const char *end = NULL;
+        bool good = strncmp(text, "delay=", 6) == 0 && read_delay(text + 6, &end, &f);
+        for (size_t i = 0; i < sizeof names / sizeof names[0] && !good; i++)
+            good = strncmp(text, names[i].name, strlen(names[i].name)) == 0 &&
+                   read_real(text + strlen(names[i].name), 0, 1, &end, names[i].probability);
+        if (!good || (*end != '\0' && (*end != ',' || end[1] == '\0')))
+            return hm2_diag_add(diag, HM2_ERR_INVALID, "faults \"%s\": expected %s", all, wanted);
+        text = *end ? end + 1 : end;
+    }
+    *faults = f;
+    return 0;
+}
+
+/* ---- the command line ---------------------------------------------------------------------------------------------
+ */
+
+enum {
+    OPT_CARD = 256,
+    OPT_BIND,
+    OPT_PORT,
+    OPT_SEED,
+    OPT_FIRMWARE,
+    OPT_FAULTS,
+    OPT_WIRE,
+    OPT_FOLLOW,
+    OPT_DRIVE,
+    OPT_MAC,
+    OPT_LATENCY,
+    OPT_REALTIME,
+    OPT_RUN,
+    OPT_STATS,
+    OPT_CONTROL,
+    OPT_QUIET,
+    OPT_HELP,
+    OPT_VERSION
+};
+
+static const struct option long_options[] = {
+    {"card", required_argument, NULL, OPT_CARD},
+    {"bind", required_argument, NULL, OPT_BIND},
+    {"port", required_argument, NULL, OPT_PORT},
+    {"seed", required_argument, NULL, OPT_SEED},
+    {"firmware", required_argument, NULL, OPT_FIRMWARE},
+    {"faults", required_argument, NULL, OPT_FAULTS},
+    {"wire", required_argument, NULL, OPT_WIRE},
+    {"follow", required_argument, NULL, OPT_FOLLOW},
+    {"drive", required_argument, NULL, OPT_DRIVE},
+    {"mac", required_argument, NULL, OPT_MAC},
+    {"latency", no_argument, NULL, OPT_LATENCY},
+    {"realtime", optional_argument, NULL, OPT_REALTIME},
+    {"run", required_argument, NULL, OPT_RUN},
+    {"stats", optional_argument, NULL, OPT_STATS},
+    {"control", required_argument, NULL, OPT_CONTROL},
+    {"quiet", no_argument, NULL, OPT_QUIET},
+    {"help", no_argument, NULL, OPT_HELP},
+    {"version", no_argument, NULL, OPT_VERSION},
+    {NULL, 0, NULL, 0},
+};
+
+static void print_help(void)
+{
+    fputs("hm2sim: Mesa HostMot2 Ethernet cards, simulated, on UDP\n"
+          "\n"
+          "usage: hm2sim [OPTION...]\n"
+          "\n"
+          "  --card TYPE[@ADDRESS[:PORT]]  one more card (default: one 7i96s). Types:",
+          stdout);
+    for (const char *const *type = sim_profiles(); *type; type++)
+        printf(" %s", *type);
+    fputs("\n"
+          "  --bind ADDRESS      of cards that give none (127.0.0.1)\n"
+          "  --port PORT         of cards that give none (27181; 0 = any free one)\n"
+          "  --seed N            of faults and MAC addresses (1)\n"
+          "  --faults LIST       loss=, dup=, reorder=, truncate=, foreign= 0..1, delay=US[-US]; by commas\n"
+          "  --latency           replies take the time that a card takes\n"
+          "  --realtime[=PRIO]   SCHED_FIFO (priority 50) and locked memory, where permitted\n"
+          "  --run SECONDS       end after this time\n"
+          "  --stats[=SECONDS]   print statistics every second (or so), not only at the end\n"
+          "  --control PATH      take commands on a Unix datagram socket\n"
+          "  --quiet             print the ready line only\n"
+          "  --help, --version\n"
+          "\n"
+          "of the card named last, or of every card when before the first --card:\n"
+          "  --firmware FILE     image as text, lines of ADDRESS VALUE in hexadecimal\n"
+          "  --mac XX:XX:XX:XX:XX:XX\n"
+          "  --wire FROM:TO      connect two I/O pins\n"
+          "  --follow ENC:STEPGEN[:NUM/DEN]  the encoder turns with the step generator\n"
+          "  --drive IO:LEVELS[:MS]  0, 1, z (floating), h (pulled up), MS milliseconds each\n"
+          "\n"
+          "When all cards listen, one line \"ready CARD@ADDRESS:PORT ...\" is printed. SIGINT and SIGTERM end it.\n",
+          stdout);
+}
+
+static int take_seconds(struct reading *const r, const char *const option, const char *const value,
+                        int64_t *const result_ns)
+{
+    double seconds;
+    if (!whole_real(value, 0.001, MAX_SECONDS, &seconds))
+        return refuse(r, option, value, "seconds, 0.001 to 1e6");
+    *result_ns = (int64_t)(seconds * NS_PER_S);
+    return 0;
+}
+
+static int take_realtime(struct reading *const r, const char *const value)
+{
+    unsigned long priority = DEFAULT_PRIORITY;
+    if (value && (!whole_unsigned(value, 99, &priority) || priority == 0))
+        return refuse(r, "--realtime", value, "a priority from 1 to 99");
+    r->options->realtime = true;
+    r->options->realtime_priority = (int)priority;
+    return 0;
+}
+
+static int take_seed(struct reading *const r, const char *const value)
+{
+    unsigned long seed;
+    if (!whole_unsigned(value, ULONG_MAX, &seed))
+        return refuse(r, "--seed", value, "a number");
+    r->options->seed = seed;
+    return 0;
+}
+
+static int take_card_option(struct reading *const r, const int option, const char *const value)
+{
+    switch (option) {
+    case OPT_FIRMWARE:
+        r->card->firmware = value;
+        return 0;
+    case OPT_MAC:
+        return set_mac(r, value);
+    case OPT_WIRE:
+        return add_wire(r, value);
+    case OPT_FOLLOW:
+        return add_follower(r, value);
+    default:
+        return add_pattern(r, value);
+    }
+}
+
+static int take(struct reading *const r, const int option, const char *const value)
+{
+    struct options *const o = r->options;
+    switch (option) {
+    case OPT_CARD:
+        return add_card(r, value);
+    case OPT_BIND:
+        return set_address(r, value);
+    case OPT_PORT:
+        return set_port(r, value);
+    case OPT_SEED:
+        return take_seed(r, value);
+    case OPT_FAULTS:
+        return options_faults(value, &o->faults, &r->diag);
+    case OPT_LATENCY:
+        o->latency = true;
+        return 0;
+    case OPT_REALTIME:
+        return take_realtime(r, value);
+    case OPT_RUN:
+        return take_seconds(r, "--run", value, &o->run_ns);
+    case OPT_STATS:
+        return take_seconds(r, "--stats", value ? value : "1", &o->stats_ns);
+    case OPT_CONTROL:
+        o->control = value;
+        return 0;
+    case OPT_QUIET:
+        o->quiet = true;
+        return 0;
+    default:
+        return take_card_option(r, option, value);
+    }
+}
+
+/* Cards without an address get the common one; no two may share a socket. */
+static int settle_addresses(struct reading *const r)
+{
+    struct options *const o = r->options;
+    if (o->card_count == 0 && add_card(r, "7i96s"))
+        return HM2_ERR_INVALID;
+    for (unsigned i = 0; i < o->card_count; i++) {
+        struct card_options *const card = &o->cards[i];
+        if (!r->own_address[i]) {
+            card->address = r->bind;
+            card->port = r->port;
+        }
+        for (unsigned k = 0; k < i; k++)
+            if (o->cards[k].address.s_addr == card->address.s_addr && o->cards[k].port == card->port && card->port)
+                return hm2_diag_add(&r->diag, HM2_ERR_INVALID,
+                                    "cards %u and %u have the same address and port; give each its own, as in "
+                                    "--card 7i96s@127.0.0.1 --card 7i93@127.0.0.2",
+                                    k, i);
+    }
+    return 0;
+}
+
+static enum options_result usage(const struct reading *const r)
+{
+    if (r->diag.len > 0)
+        fprintf(stderr, "hm2sim: %s", r->diag.text);
+    fputs("hm2sim --help lists the options\n", stderr);
+    return OPTIONS_EXIT_USAGE;
+}
+
+enum options_result options_read(struct options *const options, const int argc, char **const argv)
+{
+    static struct reading r; /* large: the diagnostics */
+    r = (struct reading){.options = options, .port = LBP16_UDP_PORT, .bind.s_addr = htonl(INADDR_LOOPBACK)};
+    r.card = &r.shared;
+    *options = (struct options){.seed = 1};
+    for (int option; (option = getopt_long(argc, argv, "", long_options, NULL)) != -1;) {
+        if (option == OPT_HELP) {
+            print_help();
+            return OPTIONS_EXIT_OK;
+        }
+        if (option == OPT_VERSION) {
+            puts("hm2sim " HM2_VERSION);
+            return OPTIONS_EXIT_OK;
+        }
+        if (option == '?' || take(&r, option, optarg))
+            return usage(&r);
+    }
+    if (optind < argc) {
+        (void)hm2_diag_add(&r.diag, HM2_ERR_INVALID, "\"%s\" is not an option", argv[optind]);
+        return usage(&r);
+    }
+    options->faults.seed = options->seed;
+    return settle_addresses(&r) ? usage(&r) : OPTIONS_RUN;
+}

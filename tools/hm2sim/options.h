@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* What hm2sim was asked to do. */
+#ifndef HM2SIM_OPTIONS_H
+#define HM2SIM_OPTIONS_H
+
+#include <netinet/in.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hm2/sim.h>
+
+#define MAX_CARDS    32u
+#define MAX_WIRES    32u
+#define MAX_PATTERNS 32u
+#define PATTERN_BITS 64u
+
+struct wire {
+    unsigned from, to;
+};
+
+struct follower {
+    unsigned encoder, stepgen;
+    int32_t num, den;
+};
+
+/* Levels that the world puts on a pad, one after the other and round again; a single one is for good. */
+struct pattern {
+    unsigned io;
+    unsigned count;
+    enum sim_level levels[PATTERN_BITS];
+    int64_t step_ns;
+};
+
+struct card_options {
+    const char *type;
+    struct in_addr address;
+    uint16_t port;
+    const char *firmware; /* file */
+    uint8_t mac[6];
+    unsigned wire_count, follower_count, pattern_count;
+    struct wire wires[MAX_WIRES];
+    struct follower followers[MAX_WIRES];
+    struct pattern patterns[MAX_PATTERNS];
+};
+
+struct options {
+    unsigned card_count;
+    struct card_options cards[MAX_CARDS];
+    uint64_t seed;
+    struct sim_faults faults;
+    bool latency, quiet, realtime;
+    int realtime_priority;
+    int64_t run_ns;      /* 0 = until a signal */
+    int64_t stats_ns;    /* 0 = at the end only */
+    const char *control; /* path of the socket */
+};
+
+enum options_result { OPTIONS_RUN, OPTIONS_EXIT_OK, OPTIONS_EXIT_USAGE };
+
+/* Reads the command line. Help, version and complaints have been printed when the result is not OPTIONS_RUN. */
+enum options_result options_read(struct options *options, int argc, char **argv);
+
+/* "loss=0.05,dup=0.02,delay=100-300": 0, or an error with a sentence in diag. Faults that are not named become 0;
+ * "none" is all of them 0. The seed is left alone. */
+int options_faults(const char *text, struct sim_faults *faults, struct hm2_diag *diag);
+/* "0", "1", "z" (floating), "h" (pulled up). */
+bool options_level(char letter, enum sim_level *level);
+
+#endif
