@@ -96,4 +96,7 @@ struct hm2_plan {
     uint8_t setup[HM2_PLAN_SETUP_BYTES];
 };
 
+/* What plan.h promises to those who provide the memory. */
+_Static_assert(sizeof(struct hm2_plan) <= (size_t)24 << 10, "a plan is about 24 KiB");
+
 #endif

@@ -28,6 +28,7 @@ struct udp {
     int watch_fd; /* of the strangers; -1 = they are not watched */
     int stop_fd;  /* tells the watcher to end */
     pthread_t watcher;
+    int64_t busy_ns; /* receive so long without sleeping before waiting for an interrupt */
 };
 
 static int64_t udp_now(struct link *const link)
@@ -79,14 +80,25 @@ static bool wait_until(struct udp *const udp, const int64_t deadline_ns)
     }
 }
 
+/* When to stop receiving without sleeping. Each attempt drives the network card's queue itself (SO_BUSY_POLL); ppoll(2)
+ * would do so only where the system-wide net.core.busy_poll is set. */
+static int64_t busy_end(struct udp *const udp, const int64_t deadline_ns)
+{
+    if (udp->busy_ns == 0)
+        return INT64_MIN;
+    const int64_t end_ns = udp_now(&udp->base) + udp->busy_ns;
+    return end_ns < deadline_ns ? end_ns : deadline_ns;
+}
+
 static int udp_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns)
 {
     struct udp *const udp = (struct udp *)link;
     /* An ICMP error takes the place of a datagram and may hide one behind it; a few of them are passed over even after
      * the deadline. */
     unsigned passes_after_deadline = 4;
+    const int64_t busy_until_ns = busy_end(udp, deadline_ns);
     for (;;) {
-        const bool in_time = wait_until(udp, deadline_ns);
+        const bool in_time = (udp->busy_ns > 0 && udp_now(link) < busy_until_ns) || wait_until(udp, deadline_ns);
         const ssize_t len = recv(udp->fd, data, cap, MSG_DONTWAIT | MSG_TRUNC);
         if (len >= 0) {
             link->counters.received++;
@@ -267,9 +279,12 @@ static int connect_to(struct udp *const udp, const struct link_udp_options *cons
     drop_early_arrivals(udp);
     if (options->busy_poll_us > 0) {
         const int busy_us = options->busy_poll_us < 1000000u ? (int)options->busy_poll_us : 1000000;
+        udp->busy_ns = busy_us * INT64_C(1000);
         if (setsockopt(udp->fd, SOL_SOCKET, SO_BUSY_POLL, &busy_us, sizeof busy_us) != 0)
-            hm2_diag_warn(diag, "Busy polling of %d us was refused: %s. Packets are waited for by interrupt.", busy_us,
-                          strerror(errno));
+            hm2_diag_warn(diag,
+                          "Busy polling of %d us was refused: %s. Packets are polled for, but the network card "
+                          "is not.",
+                          busy_us, strerror(errno));
     }
     return 0;
 }

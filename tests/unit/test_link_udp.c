@@ -104,6 +104,31 @@ static void the_deadline_is_honoured_and_a_past_one_takes_what_is_queued(void **
     (void)close(card.fd);
 }
 
+static void busy_polling_receives_and_keeps_the_deadline(void **state)
+{
+    (void)state;
+    static const unsigned busy_us[] = {1, 1000, 1000000};
+    struct peer card;
+    struct sockaddr_in from;
+    uint8_t data[64];
+    peer_open(&card);
+    for (size_t i = 0; i < sizeof busy_us / sizeof busy_us[0]; i++) {
+        const struct link_udp_options options = {.address = card.address, .busy_poll_us = busy_us[i]};
+        struct link *link = NULL;
+        assert_int_equal(link_udp_open(&link, &options, NULL), 0);
+        const int64_t deadline_ns = link_now_ns(link) + 3 * NS_PER_MS;
+        assert_int_equal(link_recv(link, data, sizeof data, deadline_ns), HM2_ERR_TIMEOUT);
+        assert_true(link_now_ns(link) >= deadline_ns);
+        assert_int_equal(link_send(link, "a", 1), 0);
+        assert_int_equal(peer_receive(&card, data, sizeof data, &from), 1);
+        send_to(card.fd, &from, "b", 1);
+        assert_int_equal(link_recv(link, data, sizeof data, link_now_ns(link) + SOON_NS), 1);
+        assert_int_equal(link_recv(link, data, sizeof data, INT64_MIN), HM2_ERR_TIMEOUT);
+        link_close(link);
+    }
+    (void)close(card.fd);
+}
+
 static void strangers_are_counted_and_never_received(void **state)
 {
     (void)state;
@@ -268,6 +293,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_datagram_goes_to_the_card_and_its_reply_comes_back),
         cmocka_unit_test(the_deadline_is_honoured_and_a_past_one_takes_what_is_queued),
+        cmocka_unit_test(busy_polling_receives_and_keeps_the_deadline),
         cmocka_unit_test(strangers_are_counted_and_never_received),
         cmocka_unit_test(without_a_watch_strangers_are_not_received_either),
         cmocka_unit_test(a_card_that_is_away_is_no_error_and_may_come_back),
