@@ -18,6 +18,7 @@ INSTALL ?= install
 
 CC ?= cc
 AR ?= ar
+NM ?= nm
 CFLAGS ?= -O2 -g
 PKG_CONFIG ?= pkg-config
 FUZZ_CC ?= clang
@@ -27,8 +28,9 @@ FUZZ_SECONDS ?= 20
 WERROR ?= -Werror
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wvla -Wswitch-enum -Wmissing-prototypes \
 	-Wstrict-prototypes -Wcast-qual -Wwrite-strings -Wundef $(WERROR)
-ALL_CFLAGS = -std=c11 -D_GNU_SOURCE -fPIC -fvisibility=hidden -ffp-contract=off $(WARNINGS) $(CPPFLAGS) $(CFLAGS) \
+ALL_CFLAGS = -std=c11 -D_GNU_SOURCE -fPIC -fvisibility=$(VISIBILITY) -ffp-contract=off $(WARNINGS) $(CPPFLAGS) $(CFLAGS) \
 	$(SANITIZE)
+VISIBILITY := hidden
 ALL_CPPFLAGS := -Ilib/include
 DEPFLAGS = -MMD -MP
 SRCDIR := $(patsubst %/,%,$(dir $(abspath $(lastword $(MAKEFILE_LIST)))))
@@ -47,7 +49,9 @@ LIB_SRC := $(sort $(foreach d,$(LIB_DIRS),$(wildcard lib/$(d)/*.c)))
 SIM_SRC := $(sort $(wildcard lib/sim/*.c))
 HOST_SRC := $(sort $(wildcard lib/halhost/*.c))
 TOOLS := $(sort $(notdir $(patsubst %/,%,$(dir $(wildcard tools/*/main.c)))))
+COMPONENT_COMMON := $(sort $(wildcard components/common/*.c))
 COMPONENTS := $(sort $(notdir $(patsubst %/,%,$(dir $(wildcard components/*/main.c)))))
+TEST_COMPONENTS := $(sort $(patsubst tests/components/%.c,%,$(wildcard tests/components/*.c)))
 UNIT_TESTS := $(sort $(patsubst tests/unit/%.c,%,$(wildcard tests/unit/test_*.c)))
 SYSTEM_TESTS := $(sort $(patsubst tests/system/%.c,%,$(wildcard tests/system/check_*.c)))
 FUZZERS := $(sort $(patsubst tests/fuzz/%.c,%,$(wildcard tests/fuzz/fuzz_*.c)))
@@ -55,6 +59,10 @@ BENCHES := $(sort $(patsubst tests/bench/%.c,%,$(wildcard tests/bench/bench_*.c)
 UNIT_HELPERS := $(sort $(filter-out tests/unit/test_%.c,$(wildcard tests/unit/*.c)))
 SYSTEM_HELPERS := $(sort $(filter-out tests/system/check_%.c,$(wildcard tests/system/*.c)))
 MAN_PAGES := $(sort $(wildcard man/*.[0-9]))
+
+# hm2host's prompt is better with libedit, and works without.
+EDIT_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libedit 2>/dev/null)
+EDIT_LIBS ?= $(shell $(PKG_CONFIG) --libs libedit 2>/dev/null)
 
 obj = $(patsubst %.c,$(BUILDDIR)/obj/%.o,$(1))
 LIB_OBJ := $(call obj,$(LIB_SRC))
@@ -67,6 +75,7 @@ SIM_A := $(BUILDDIR)/libhm2sim.a
 HOST_A := $(BUILDDIR)/libhalhost.a
 PROGRAMS := $(addprefix $(BUILDDIR)/,$(TOOLS))
 COMPONENT_SO := $(patsubst %,$(BUILDDIR)/components/%.so,$(COMPONENTS))
+TEST_COMPONENT_SO := $(patsubst %,$(BUILDDIR)/test-components/%.so,$(TEST_COMPONENTS))
 UNIT_BIN := $(addprefix $(BUILDDIR)/unit/,$(UNIT_TESTS))
 SYSTEM_BIN := $(addprefix $(BUILDDIR)/system/,$(SYSTEM_TESTS))
 FUZZ_BIN := $(addprefix $(BUILDDIR)/fuzz/,$(FUZZERS))
@@ -88,8 +97,11 @@ help: ## this list
 $(BUILDDIR)/obj/lib/sim/%.o: EXTRA_CPPFLAGS := -Ilib/sim
 $(BUILDDIR)/obj/lib/halhost/%.o: EXTRA_CPPFLAGS := -Ilib/halhost -Ilib/halhost/include
 $(BUILDDIR)/obj/components/%.o: EXTRA_CPPFLAGS := -Icomponents -Ilib/halhost/include -DRTAPI -D__MODULE__
+$(BUILDDIR)/obj/tests/components/%.o: EXTRA_CPPFLAGS := -Icomponents -Ilib/halhost/include -DRTAPI -D__MODULE__
+# What a component exports is said by its EXPORT_SYMBOL()s and done by the linker (see component_link).
+$(BUILDDIR)/obj/components/%.o $(BUILDDIR)/obj/tests/components/%.o: VISIBILITY := default
 $(BUILDDIR)/obj/tools/%.o: EXTRA_CPPFLAGS := -Ilib/sim -Ilib/halhost -Ilib/halhost/include -DHM2_VERSION='"$(VERSION)"' \
-	-DHM2_SOURCE_DIR='"$(SRCDIR)"' $(EDIT_CFLAGS)
+	-DHM2_SOURCE_DIR='"$(SRCDIR)"' -DHM2_COMPONENT_DIR='"$(libdir)/hm2/components"' $(EDIT_CFLAGS) $(if $(EDIT_LIBS),-DHM2_HAVE_LIBEDIT)
 $(BUILDDIR)/obj/tests/%.o: EXTRA_CPPFLAGS := -Ilib/sim -Ilib/halhost -Ilib/halhost/include -Ilib/board -Ilib/module \
 	-Ilib/hostmot2 -DTEST_DATA='"$(SRCDIR)/tests/data"' -DTEST_BUILD='"$(abspath $(BUILDDIR))"' \
 	-DTEST_SOURCE='"$(SRCDIR)"'
@@ -116,9 +128,6 @@ $(BUILDDIR)/libhm2.pc: lib/libhm2.pc.in Makefile
 
 # ---- programs and components --------------------------------------------------------------------------------------
 
-EDIT_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libedit 2>/dev/null)
-EDIT_LIBS ?= $(shell $(PKG_CONFIG) --libs libedit 2>/dev/null)
-
 define tool_rule
 $(BUILDDIR)/$(1): $(call obj,$(wildcard tools/$(1)/*.c)) $$(if $$(filter hm2host,$(1)),$(HOST_A)) $(SIM_A) $(LIB_A)
 	@mkdir -p $$(@D)
@@ -129,13 +138,23 @@ $(BUILDDIR)/%: TOOL_LIBS = $(SIM_A) $(LIB_A)
 # The host exports its HAL and RTAPI calls to the modules it loads, so every object of it must be linked in.
 $(BUILDDIR)/hm2host: TOOL_LIBS = -Wl,--whole-archive $(HOST_A) -Wl,--no-whole-archive $(LIB_A) -rdynamic -ldl $(EDIT_LIBS)
 
+# A module of LinuxCNC's kind: exactly the names marked with EXPORT_SYMBOL() are global, everything else is local.
+define component_link
+	@mkdir -p $(@D)
+	@{ echo '{ global:'; $(NM) $(filter %.o,$^) | sed -n 's/.* rtapi_exported_\(.*\)/\1;/p'; \
+		echo 'local: *; };'; } >$@.map
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -shared -Wl,--exclude-libs,ALL -Wl,--version-script,$@.map -o $@ \
+		$(filter %.o,$^) $(LIB_A) -lm -lpthread
+endef
+
 define component_rule
-$(BUILDDIR)/components/$(1).so: $(call obj,$(wildcard components/$(1)/*.c)) $(LIB_A)
-	@mkdir -p $$(@D)
-	$$(call say,LD,$$@)$$(CC) $$(ALL_CFLAGS) $$(LDFLAGS) -shared -Wl,--exclude-libs,ALL -o $$@ $$(filter %.o,$$^) \
-		$(LIB_A) -lm -lpthread
+$(BUILDDIR)/components/$(1).so: $(call obj,$(wildcard components/$(1)/*.c) $(COMPONENT_COMMON)) $(LIB_A)
+	$$(component_link)
 endef
 $(foreach c,$(COMPONENTS),$(eval $(call component_rule,$(c))))
+
+$(BUILDDIR)/test-components/%.so: $(BUILDDIR)/obj/tests/components/%.o $(call obj,$(COMPONENT_COMMON)) $(LIB_A)
+	$(component_link)
 
 # ---- tests --------------------------------------------------------------------------------------------------------
 
@@ -159,10 +178,10 @@ $(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(SIM_A) $(LIB_A)
 check: check-unit check-system ## run all tests; ends with "N passed, N failed, N skipped"
 	@scripts/run-tests --summary $(BUILDDIR)
 
-check-unit: $(UNIT_BIN) all
+check-unit: $(UNIT_BIN) $(TEST_COMPONENT_SO) all
 	@scripts/run-tests $(BUILDDIR) unit $(UNIT_BIN)
 
-check-system: all $(SYSTEM_BIN)
+check-system: all $(SYSTEM_BIN) $(TEST_COMPONENT_SO)
 	@scripts/run-tests $(BUILDDIR) system $(SYSTEM_BIN)
 
 bench: all $(BENCH_BIN) ## compare with the peers, as ratios, in one run
