@@ -35,15 +35,27 @@ void trace_free(struct trace_file *const trace)
     *trace = (struct trace_file){0};
 }
 
+const struct trace_event *trace_next(const struct trace_file *const trace, size_t *const index, const char *const test)
+{
+    while (*index < trace->count) {
+        const struct trace_event *const event = &trace->events[(*index)++];
+        if (!test || strcmp(event->test, test) == 0)
+            return event;
+    }
+    return NULL;
+}
+
+bool trace_is(const struct trace_event *const event, const char kind, const char *const name)
+{
+    return event->kind == kind && strcmp(event->name, name) == 0;
+}
+
 const struct trace_event *trace_find(const struct trace_file *const trace, size_t *const index, const char *const test,
                                      const char kind, const char *const name)
 {
-    for (; *index < trace->count; (*index)++) {
-        const struct trace_event *const event = &trace->events[*index];
-        if (event->kind == kind && strcmp(event->test, test) == 0 && strcmp(event->name, name) == 0) {
-            (*index)++;
+    const struct trace_event *event;
+    while ((event = trace_next(trace, index, test)) != NULL)
+        if (trace_is(event, kind, name))
             return event;
-        }
-    }
     return NULL;
 }

@@ -3,6 +3,7 @@
 #ifndef TRACE_FILE_H
 #define TRACE_FILE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -26,5 +27,8 @@ void trace_free(struct trace_file *trace);
 /* First event of a test with this kind and name, from index on; NULL when there is none. */
 const struct trace_event *trace_find(const struct trace_file *trace, size_t *index, const char *test, char kind,
                                      const char *name);
+/* Next event of a test (NULL: of any) from index on; NULL at the end. */
+const struct trace_event *trace_next(const struct trace_file *trace, size_t *index, const char *test);
+bool trace_is(const struct trace_event *event, char kind, const char *name);
 
 #endif
