@@ -16,21 +16,33 @@ static void *grown(void *const memory, size_t *const capacity, const size_t need
     return larger;
 }
 
-int exchange_add(struct exchange *const exchange, const struct exchange_item *const item, const uint8_t *const bytes)
+/* Make room for one item more and its bytes. */
+static int make_room(struct exchange *const exchange, const size_t len)
 {
     struct exchange_item *const items =
         grown(exchange->items, &exchange->item_capacity, exchange->count + 1, sizeof items[0]);
     if (!items)
         return HM2_ERR_NOMEM;
     exchange->items = items;
-    uint8_t *const all = grown(exchange->bytes, &exchange->byte_capacity, exchange->used + item->len + 1, 1);
-    if (!all)
+    uint8_t *const bytes = grown(exchange->bytes, &exchange->byte_capacity, exchange->used + len + 1, 1);
+    if (!bytes)
         return HM2_ERR_NOMEM;
-    exchange->bytes = all;
+    exchange->bytes = bytes;
+    return 0;
+}
+
+int exchange_add(struct exchange *const exchange, const struct exchange_item *const item, const uint8_t *const bytes,
+                 struct hm2_diag *const diag)
+{
+    if (exchange->count == EXCHANGE_MAX_ITEMS)
+        return hm2_diag_add(diag, HM2_ERR_NOSPACE, "Line %u: more than %zu datagrams.", item->line, EXCHANGE_MAX_ITEMS);
+    const int err = make_room(exchange, item->len);
+    if (err)
+        return hm2_diag_add(diag, err, "Line %u: no memory for %zu datagrams.", item->line, exchange->count + 1);
     if (item->len > 0)
-        memcpy(all + exchange->used, bytes, item->len);
-    items[exchange->count] = *item;
-    items[exchange->count].at = exchange->used;
+        memcpy(exchange->bytes + exchange->used, bytes, item->len);
+    exchange->items[exchange->count] = *item;
+    exchange->items[exchange->count].at = exchange->used;
     exchange->count++;
     exchange->used += item->len;
     return 0;

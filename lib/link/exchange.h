@@ -11,6 +11,8 @@
 
 /* A mock may answer more than a card can, to show what becomes of it. */
 #define EXCHANGE_MAX_DATAGRAM_BYTES 2048u
+/* More than any capture that can be read has when its datagrams have some bytes; bounds the memory of a hostile one. */
+#define EXCHANGE_MAX_ITEMS ((size_t)1 << 22)
 /* Keeps every sum of two times inside 64 bits; 36 years. */
 #define EXCHANGE_MAX_NS INT64_C(0x1000000000000000)
 
@@ -34,8 +36,9 @@ struct exchange {
     size_t used, byte_capacity;
 };
 
-/* Append an item and its bytes. HM2_ERR_NOMEM. item->at is set here. */
-int exchange_add(struct exchange *exchange, const struct exchange_item *item, const uint8_t *bytes);
+/* Append an item and its bytes; item->at is set here. HM2_ERR_NOMEM, HM2_ERR_NOSPACE, with a sentence in diag. */
+int exchange_add(struct exchange *exchange, const struct exchange_item *item, const uint8_t *bytes,
+                 struct hm2_diag *diag);
 void exchange_free(struct exchange *exchange);
 
 /* A mock that follows the exchange and frees it in the end; on failure the exchange is freed at once. */

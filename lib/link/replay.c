@@ -63,8 +63,7 @@ static int parse_line(struct capture *const capture, struct text_span line)
         item.delay_ns = (int64_t)(time_ns - capture->sent_ns);
     else
         capture->sent_ns = time_ns;
-    const int err = exchange_add(&capture->exchange, &item, capture->bytes);
-    return err ? hm2_diag_add(capture->diag, err, "No memory for a capture of this length.") : 0;
+    return exchange_add(&capture->exchange, &item, capture->bytes, capture->diag);
 }
 
 int link_replay_text(struct link **const link, const char *const text, const size_t len, struct hm2_diag *const diag)

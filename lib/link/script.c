@@ -50,8 +50,7 @@ static int add(struct script *const script, const enum exchange_kind kind, const
         .len = len,
         .delay_ns = kind == EXCHANGE_REPLY ? (int64_t)script->faults.of[FAULT_DELAY].number : 0,
     };
-    const int err = exchange_add(&script->exchange, &item, script->bytes);
-    return err ? hm2_diag_add(script->diag, err, "No memory for a script of this length.") : 0;
+    return exchange_add(&script->exchange, &item, script->bytes, script->diag);
 }
 
 static int add_expected(struct script *const script, const size_t len)

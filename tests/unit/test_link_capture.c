@@ -134,6 +134,23 @@ static void a_wrong_capture_is_refused_with_its_line(void **state)
     }
 }
 
+static void a_capture_of_too_many_datagrams_is_refused(void **state)
+{
+    (void)state;
+    enum { LINES = (1 << 22) + 1, HEADER = 13, LINE = 4 };
+    struct hm2_diag diag = {0};
+    struct link *link = NULL;
+    char *const text = malloc(HEADER + (size_t)LINES * LINE);
+    assert_non_null(text);
+    memcpy(text, "hm2capture 1\n", HEADER);
+    for (size_t i = 0; i < LINES; i++)
+        memcpy(text + HEADER + i * LINE, "0 !\n", LINE);
+    assert_int_equal(link_replay_text(&link, text, HEADER + (size_t)LINES * LINE, &diag), HM2_ERR_NOSPACE);
+    assert_string_equal(diag.text, "Line 4194306: more than 4194304 datagrams.\n");
+    assert_null(link);
+    free(text);
+}
+
 static void files_that_cannot_be_opened_are_named(void **state)
 {
     (void)state;
@@ -158,6 +175,7 @@ int main(void)
         cmocka_unit_test(a_request_that_differs_from_the_recorded_one_is_told_with_its_line),
         cmocka_unit_test(a_datagram_too_long_for_the_reader_leaves_a_comment),
         cmocka_unit_test(a_wrong_capture_is_refused_with_its_line),
+        cmocka_unit_test(a_capture_of_too_many_datagrams_is_refused),
         cmocka_unit_test(files_that_cannot_be_opened_are_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
