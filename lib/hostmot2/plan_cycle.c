@@ -87,8 +87,11 @@ bool hm2_plan_settled(const struct hm2_plan *const plan)
 
 void hm2_plan_touch_all(struct hm2_plan *const plan)
 {
-    plan->session_state = PLAN_DIRTY;
-    plan->facts.session_kept = true;
+    /* While the card still knows the session, its number stays a witness: a power loss right now must not be missed. */
+    if (!plan->facts.session_kept) {
+        plan->session_state = PLAN_DIRTY;
+        plan->facts.session_kept = true;
+    }
     for (unsigned i = 0; i < plan->section_count; i++)
         if (!plan->sections[i].on_demand)
             move(plan, i, PLAN_DIRTY);

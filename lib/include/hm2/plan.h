@@ -126,7 +126,7 @@ HM2_API void hm2_section_move(struct hm2_section *section, uint16_t address);
 HM2_API bool hm2_section_confirmed(const struct hm2_section *section);
 /* True when the card has confirmed every section as it stands, and its session number: nothing is on its way. */
 HM2_API bool hm2_plan_settled(const struct hm2_plan *plan);
-/* Everything again, the session number included: the card lost its state or a person cleared a fault. Sections on
+/* Everything again: the card lost its state (then the session number too) or a person cleared a fault. Sections on
  * demand are left as they are. */
 HM2_API void hm2_plan_touch_all(struct hm2_plan *plan);
 
