@@ -168,6 +168,7 @@ int64_t board_read_limit_ns(int32_t setting, int64_t period_ns);
 
 /* Report an event of the board, each kind at most once in NOTICE_ABSENT_NS. Realtime safe. */
 void board_event(struct hm2_board *board, enum board_event_kind kind, const struct board_event *facts);
+int64_t board_write_gap_ns(const struct hm2_board *board);
 enum board_bite_reason board_bite_reason(const struct hm2_board *board);
 
 /* The card has lost its state: from now on its identity is asked for. Realtime safe, as all of these. */

@@ -67,7 +67,7 @@ void hm2_notice(const struct hm2_module *const module, const enum hm2_notice not
     struct board_event event = {.module = module, .kind = (int)notice, .instance = instance, .value = value};
     if (notice == HM2_NOTICE_WATCHDOG_BIT) {
         event.words[BOARD_BITE_REASON] = board_bite_reason(board);
-        event.words[BOARD_BITE_GAP_US] = microseconds(board->write_gap_ns);
+        event.words[BOARD_BITE_GAP_US] = microseconds(board_write_gap_ns(board));
         event.words[BOARD_BITE_PERIOD_US] = microseconds(board->period_ns);
     }
     (void)board_notices_push(&board->notices, &event);

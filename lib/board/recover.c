@@ -11,11 +11,18 @@
 
 #define RECENT_CYCLES 10u
 
+/* A write that is overdue right now counts too. */
+int64_t board_write_gap_ns(const struct hm2_board *const board)
+{
+    const int64_t open_ns = board->writes > 0 ? board->notices.now_ns - board->write_ns : 0;
+    return open_ns > board->write_gap_ns ? open_ns : board->write_gap_ns;
+}
+
 enum board_bite_reason board_bite_reason(const struct hm2_board *const board)
 {
     if (board->lossy && board->cycles - board->last_loss_cycle <= RECENT_CYCLES)
         return BOARD_BITE_PACKET_LOSS;
-    return board->write_gap_ns > board->period_ns * 3 / 2 ? BOARD_BITE_LATE_WRITE : BOARD_BITE_UNKNOWN;
+    return board_write_gap_ns(board) > board->period_ns * 3 / 2 ? BOARD_BITE_LATE_WRITE : BOARD_BITE_UNKNOWN;
 }
 
 void board_recovery_begin(struct hm2_board *const board)

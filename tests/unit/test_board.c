@@ -835,11 +835,23 @@ static void a_bite_after_a_late_write_says_so(void **state)
     start(f);
     cycles(f, 20);
     link_mock_advance(f->link, 7000000);
-    cycle(f);
-    /* The gap is seen by the write; the card bites in it, and the next read tells. */
     bite(f);
     cycle(f);
-    assert_true(message(f, "Reason: late write, 8000 us between two writes at a period of 1000 us", true));
+    assert_true(message(f, "Reason: late write, 7950 us between two writes at a period of 1000 us", true));
+}
+
+static void a_late_write_is_remembered_until_a_good_reply_was_seen(void **state)
+{
+    struct fixture *const f = *state;
+    start(f);
+    cycles(f, 20);
+    hm2_board_read(f->board, PERIOD_NS);
+    link_mock_advance(f->link, 7000000); /* held up between read and write */
+    bite(f);
+    hm2_board_write(f->board, PERIOD_NS);
+    link_mock_advance(f->link, PERIOD_NS);
+    cycle(f);
+    assert_true(message(f, "Reason: late write, 8000 us between", true));
 }
 
 static void a_bite_after_lost_packets_says_so(void **state)
@@ -918,6 +930,21 @@ static void the_same_firmware_is_restored_with_outputs_off_until_a_person_clears
     cycles(f, 3);
     assert_int_equal(f->card.registers[PROBE_WRITE / 4], 9);
     EXPECT("watchdog.has_bit", 0);
+}
+
+static void a_power_loss_in_the_moment_of_clearing_a_bite_is_noticed(void **state)
+{
+    struct fixture *const f = *state;
+    start(f);
+    cycles(f, 10);
+    bite(f);
+    cycles(f, 3);
+    set(f, "watchdog.has_bit", 0);
+    cycle(f); /* everything is on its way again */
+    fake_card_power_cycle(&f->card);
+    cycles(f, 6);
+    EXPECT("watchdog.has_bit", 1);
+    assert_int_equal(f->probe->starts, 2);
 }
 
 static void a_restore_survives_losses(void **state)
@@ -1062,10 +1089,12 @@ int main(void)
         TEST(a_write_that_cannot_be_sent_is_sent_again),
         TEST(a_bite_is_told_with_its_reason),
         TEST(a_bite_after_a_late_write_says_so),
+        TEST(a_late_write_is_remembered_until_a_good_reply_was_seen),
         TEST(a_bite_after_lost_packets_says_so),
         TEST(clearing_has_bit_brings_outputs_back),
         TEST(a_card_that_lost_its_power_is_asked_who_it_is_before_anything_is_sent),
         TEST(the_same_firmware_is_restored_with_outputs_off_until_a_person_clears_has_bit),
+        TEST(a_power_loss_in_the_moment_of_clearing_a_bite_is_noticed),
         TEST(a_restore_survives_losses),
         TEST(a_long_power_cut_needs_io_error_and_has_bit_cleared),
         TEST(other_firmware_is_refused_and_nothing_more_is_sent),
