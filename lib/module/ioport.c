@@ -324,9 +324,10 @@ static bool parameters_changed(struct ioport *const ctx)
 
 static uint32_t outputs(const struct port *const port)
 {
+    const struct gpio_out *const first = port->out + port->gpio_first;
     uint32_t data = 0;
-    for (unsigned bit = port->gpio_end; bit > port->gpio_first; bit--)
-        data = data << 1 | *port->out[bit - 1].out;
+    for (const struct gpio_out *at = port->out + port->gpio_end; at > first; at--)
+        data = data << 1 | *at[-1].out;
     return data << port->gpio_first;
 }
 
