@@ -29,13 +29,21 @@ const char *hm2_config_key(const enum hm2_config_count which)
     return (unsigned)which < HM2_CFG_COUNTS ? count_keys[which] : "";
 }
 
+/* Mode 0 for the channels that the text leaves open. */
+static void set_modes(char modes[HM2_CFG_SSERIAL_CHANNELS], const char *text)
+{
+    for (unsigned i = 0; i < HM2_CFG_SSERIAL_CHANNELS; i++)
+        modes[i] = *text ? *text++ : '0';
+}
+
 void hm2_config_default(struct hm2_config *const config)
 {
     memset(config, 0, sizeof *config);
     for (unsigned i = 0; i < HM2_CFG_COUNTS; i++)
         config->count[i] = HM2_CFG_ALL;
     config->stepgen_width = 2;
-    memset(config->sserial_mode, '0', sizeof config->sserial_mode);
+    for (unsigned i = 0; i < HM2_CFG_SSERIAL_PORTS; i++)
+        set_modes(config->sserial_mode[i], "");
 }
 
 unsigned hm2_config_sserial_ports(const struct hm2_config *const config, const unsigned available)
@@ -119,8 +127,7 @@ static void take_sserial(struct scan *const scan, const unsigned port, const cha
         return;
     }
     config->sserial_given = config->sserial_port_given[port] = true;
-    memset(config->sserial_mode[port], '0', sizeof config->sserial_mode[port]);
-    memcpy(config->sserial_mode[port], value, len);
+    set_modes(config->sserial_mode[port], value);
     config->sserial_port_used[port] = strspn(value, "x") != len;
 }
 
@@ -269,6 +276,7 @@ static void scan_token(struct scan *const scan, const char *const text, const si
         *equals = '\0';
     scan->token = token;
     take_token(scan, name, equals ? equals + 1 : NULL);
+    scan->token = NULL;
 }
 
 int hm2_config_parse(const char *text, struct hm2_config *const config, struct hm2_diag *const diag)

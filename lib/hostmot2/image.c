@@ -101,7 +101,7 @@ static int next_word(struct reader *const reader, uint32_t *const address, uint3
 /* The ROM may stand anywhere: its place is needed before its words are. */
 static int find_rom(struct reader reader, uint32_t *const rom_address, struct hm2_diag *const diag)
 {
-    uint32_t address, value;
+    uint32_t address = 0, value = 0;
     int more;
     *rom_address = DEFAULT_ROM_ADDRESS;
     while ((more = next_word(&reader, &address, &value, diag)) > 0)
@@ -114,7 +114,7 @@ int hm2_image_from_text(const char *const text, const size_t len, struct hm2_ima
                         struct hm2_diag *const diag)
 {
     struct reader reader = {.text = text, .left = len};
-    uint32_t rom_address, address, value;
+    uint32_t rom_address, address = 0, value = 0;
     memset(image, 0, sizeof *image);
     int more = find_rom(reader, &rom_address, diag);
     if (more < 0)

@@ -255,7 +255,7 @@ static void a_stale_set_up_reply_is_not_taken_for_a_fresh_one(void **state)
     assert_int_equal(identify(f), 0);
     uint32_t value = 0;
     f->card.registers[0x3000 / 4] = 1;
-    f->card.delay_ns = BOARD_TRY_NS + 2 * FAKE_REPLY_NS; /* behind the reply to the second request */
+    f->card.delay_ns = BOARD_TRY_NS + FAKE_REPLY_NS / 2; /* behind the reply to the second request */
     assert_int_equal(board_peek(f->board, 0x3000, 1, &value), 0);
     assert_int_equal(value, 1);
     f->card.registers[0x3000 / 4] = 2; /* the late reply, with 1, is still on its way */
@@ -579,8 +579,16 @@ static void five_lost_replies_raise_io_error_and_freeze_every_input(void **state
         EXPECT("data-age", i);
         EXPECT("probe.in", 5);
     }
-    assert_true(message(f, "packet error: 1 failed cycles so far (no reply in time 1,", false));
-    assert_true(message(f, "error finishing read: 5 failed cycles so far", true));
+    char text[1024];
+    bool error;
+    assert_int_equal(hm2_board_next_message(f->board, text, sizeof text, &error), 1);
+    assert_non_null(strstr(text, "packet error: 1 failed cycles so far (no reply in time 1,"));
+    assert_false(error);
+    /* The next three were no news. */
+    assert_int_equal(hm2_board_next_message(f->board, text, sizeof text, &error), 1);
+    assert_non_null(strstr(text, "error finishing read: 5 failed cycles so far"));
+    assert_true(error);
+    assert_int_equal(hm2_board_next_message(f->board, text, sizeof text, &error), 0);
 }
 
 static void with_io_error_nothing_is_sent_until_a_person_clears_it(void **state)
@@ -804,8 +812,7 @@ static void a_write_that_cannot_be_sent_is_sent_again(void **state)
     f->card.refuse_send = true;
     hm2_board_write(f->board, PERIOD_NS);
     assert_int_equal(f->card.registers[PROBE_SETTING / 4], 77);
-    link_mock_advance(f->link, PERIOD_NS);
-    cycle(f);
+    hm2_board_write(f->board, PERIOD_NS);
     assert_int_equal(f->card.registers[PROBE_SETTING / 4], 43);
 }
 
@@ -821,6 +828,9 @@ static void a_bite_is_told_with_its_reason(void **state)
 {
     struct fixture *const f = *state;
     start(f);
+    cycles(f, 3);
+    link_mock_advance(f->link, 7000000); /* a late write and a loss long ago did not make it bite */
+    f->card.lose_reply = true;
     cycles(f, 20);
     bite(f);
     cycle(f);
@@ -862,6 +872,18 @@ static void a_bite_after_lost_packets_says_so(void **state)
     f->card.dead = true;
     cycles(f, 4);
     f->card.dead = false;
+    bite(f);
+    cycle(f);
+    assert_true(message(f, "Reason: packets were lost", true));
+}
+
+static void a_bite_after_a_lost_write_says_so(void **state)
+{
+    struct fixture *const f = *state;
+    start(f);
+    cycles(f, 20);
+    f->card.lose_write = true;
+    cycle(f);
     bite(f);
     cycle(f);
     assert_true(message(f, "Reason: packets were lost", true));
@@ -947,23 +969,71 @@ static void a_power_loss_in_the_moment_of_clearing_a_bite_is_noticed(void **stat
     assert_int_equal(f->probe->starts, 2);
 }
 
-static void a_restore_survives_losses(void **state)
+static void a_restore_ends_only_when_everything_is_confirmed_whatever_is_lost(void **state)
+{
+    struct fixture *const f = *state;
+    start(f);
+    set(f, "packet-error-limit", 1000);
+    for (unsigned pattern = 0; pattern < 256; pattern++) {
+        const unsigned starts = f->probe->starts;
+        cycles(f, 5);
+        fake_card_power_cycle(&f->card);
+        for (unsigned i = 0; i < 30 && f->probe->starts == starts; i++) {
+            f->card.lose_write = pattern >> i & 1u;
+            f->card.lose_reply = pattern >> (i + 4) & 1u;
+            cycle(f);
+            f->card.lose_write = f->card.lose_reply = false;
+            assert_int_equal(f->card.registers[PROBE_WRITE / 4], 0);
+        }
+        assert_int_equal(f->probe->starts, starts + 1);
+        assert_int_equal(f->card.registers[PROBE_SETTING / 4], 77);
+        assert_true(hm2_plan_settled(f->board->plan));
+        EXPECT("watchdog.has_bit", 1);
+        set(f, "watchdog.has_bit", 0);
+    }
+}
+
+static void firmware_that_changes_during_a_restore_is_refused_too(void **state)
 {
     struct fixture *const f = *state;
     start(f);
     cycles(f, 10);
     fake_card_power_cycle(&f->card);
-    for (int i = 0; i < 40; i++) {
-        f->card.lose_reply = i % 3 == 1;
-        f->card.lose_write = i % 4 == 2;
-        cycle(f);
-        f->card.lose_reply = f->card.lose_write = false;
-        if (f->probe->starts == 2)
-            break;
-    }
+    cycles(f, 2);
+    assert_int_equal(f->board->recovery, BOARD_RESTORES);
+    f->card.dead = true;
+    cycles(f, 10);
+    EXPECT("io_error", 1);
+    f->card.dead = false;
+    f->card.image.rom[30] ^= 1;
+    fake_card_power_cycle(&f->card);
+    set(f, "io_error", 0);
+    const unsigned writes = f->card.writes;
+    cycles(f, 3);
+    EXPECT("io_error", 1);
+    assert_int_equal(f->card.writes, writes);
+    assert_true(message(f, "came back with other firmware", true));
+}
+
+static void without_a_watchdog_io_error_holds_the_outputs_after_a_power_loss(void **state)
+{
+    struct fixture *const f = *state;
+    f->card.image.rom[(0x40 + 12) / 4] = 0x0101000B;
+    start(f);
+    assert_null(f->board->watchdog);
+    set(f, "probe.out", 9);
+    cycles(f, 10);
+    assert_int_equal(f->card.registers[PROBE_WRITE / 4], 9);
+    fake_card_power_cycle(&f->card);
+    cycles(f, 10);
+    EXPECT("io_error", 1);
     assert_int_equal(f->probe->starts, 2);
     assert_int_equal(f->card.registers[PROBE_SETTING / 4], 77);
-    EXPECT("watchdog.has_bit", 1);
+    assert_int_equal(f->card.registers[PROBE_WRITE / 4], 0);
+    set(f, "io_error", 0);
+    cycles(f, 2);
+    assert_int_equal(f->card.registers[PROBE_WRITE / 4], 9);
+    hm2_board_stop(f->board);
 }
 
 static void a_long_power_cut_needs_io_error_and_has_bit_cleared(void **state)
@@ -1091,11 +1161,14 @@ int main(void)
         TEST(a_bite_after_a_late_write_says_so),
         TEST(a_late_write_is_remembered_until_a_good_reply_was_seen),
         TEST(a_bite_after_lost_packets_says_so),
+        TEST(a_bite_after_a_lost_write_says_so),
         TEST(clearing_has_bit_brings_outputs_back),
         TEST(a_card_that_lost_its_power_is_asked_who_it_is_before_anything_is_sent),
         TEST(the_same_firmware_is_restored_with_outputs_off_until_a_person_clears_has_bit),
         TEST(a_power_loss_in_the_moment_of_clearing_a_bite_is_noticed),
-        TEST(a_restore_survives_losses),
+        TEST(a_restore_ends_only_when_everything_is_confirmed_whatever_is_lost),
+        TEST(firmware_that_changes_during_a_restore_is_refused_too),
+        TEST(without_a_watchdog_io_error_holds_the_outputs_after_a_power_loss),
         TEST(a_long_power_cut_needs_io_error_and_has_bit_cleared),
         TEST(other_firmware_is_refused_and_nothing_more_is_sent),
         TEST(the_right_firmware_programmed_again_is_restored),

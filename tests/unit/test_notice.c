@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "unit.h"
 
+#include <pthread.h>
+#include <sched.h>
+
 #include "board_private.h"
 
 struct fixture {
@@ -96,12 +99,49 @@ static void a_full_ring_counts_what_it_drops_and_keeps_the_oldest(void **state)
     free(f);
 }
 
+#define EVENTS 200000u
+
+static void *produce(void *const context)
+{
+    struct board_notices *const notices = context;
+    for (unsigned i = 0; i < EVENTS; i++) {
+        struct board_event event = {.instance = i, .value = i};
+        for (unsigned word = 0; word < NOTICE_WORDS; word++)
+            event.words[word] = i;
+        while (!board_notices_push(notices, &event))
+            (void)sched_yield();
+    }
+    return NULL;
+}
+
+static void events_pass_whole_and_in_order_between_threads(void **state)
+{
+    (void)state;
+    struct fixture *const f = new_fixture();
+    pthread_t thread;
+    assert_int_equal(pthread_create(&thread, NULL, produce, &f->board->notices), 0);
+    struct board_event event;
+    for (unsigned i = 0; i < EVENTS;) {
+        if (!board_notices_pop(&f->board->notices, &event)) {
+            (void)sched_yield();
+            continue;
+        }
+        if (event.instance != i || event.value != i || event.words[0] != i || event.words[NOTICE_WORDS - 1] != i)
+            fail_msg("event %u arrived as %u", i, event.instance);
+        i++;
+    }
+    assert_int_equal(pthread_join(thread, NULL), 0);
+    hm2_board_free(f->board);
+    free(f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(without_a_board_a_notice_is_only_counted),
         cmocka_unit_test(a_condition_is_reported_once_until_it_was_absent),
         cmocka_unit_test(different_conditions_are_reported_each),
+        cmocka_unit_test(events_pass_whole_and_in_order_between_threads),
         cmocka_unit_test(a_full_ring_counts_what_it_drops_and_keeps_the_oldest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
