@@ -9,6 +9,7 @@ extern const struct sim_module_ops sim_irq_ops;
 extern const struct sim_module_ops sim_led_ops;
 extern const struct sim_module_ops sim_muxed_encoder_ops;
 extern const struct sim_module_ops sim_muxed_select_ops;
+extern const struct sim_module_ops sim_pwmgen_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_watchdog_ops;
 
@@ -19,6 +20,7 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_led_ops,           /* 80 */
     &sim_stepgen_ops,       /* 05 */
     &sim_watchdog_ops,      /* 02 */
+    &sim_pwmgen_ops,        /* 06 */
     &sim_encoder_ops,       /* 04 */
     &sim_muxed_encoder_ops, /* 0C */
     &sim_muxed_select_ops,  /* 0D */

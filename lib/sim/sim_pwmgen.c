@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* PWMGen, tag 06: PWM and PDM generators clocked by ClockHigh (register map 3.6, traces in folder pwmgen). */
+#include "pwm_logic.h"
+#include "sim_card.h"
+
+#define INSTANCES_MAX 64u /* address bits 7..2 select the instance (1.1) */
+#define PIN_A         0x81u
+#define PIN_B         0x82u
+#define PIN_ENABLE    0x83u
+
+enum { PAGE_VALUE, PAGE_MODE, PAGE_PWM_RATE, PAGE_PDM_RATE, PAGE_ENABLE, PAGES };
+
+__extension__ typedef __int128 wide;
+
+struct pwmgens {
+    unsigned count;
+    uint32_t enable, enable_mask;
+    int64_t edges; /* of ClockHigh that have been made */
+    struct pwm_reference reference;
+    struct pwm_channel channels[INSTANCES_MAX];
+};
+
+/* ---- the two clocks
+ * --------------------------------------------------------------------------------------------------- Edges of both lie
+ * in the middle of their periods, counted from power-up (README of folder pwmgen). */
+
+/* Edges of ClockHigh before edge clk of ClockLow; with_same: one at the very same time included. */
+static int64_t high_edges(const struct sim_module *const m, const int64_t clk, const bool with_same)
+{
+    const wide low_hz = sim_clock_low_hz(m->card), high_hz = sim_clock_high_hz(m->card);
+    if (low_hz <= 0 || clk < 0)
+        return 0;
+    const wide twice = ((wide)2 * clk + 1) * high_hz - low_hz;
+    if (twice < 0)
+        return 0;
+    return (int64_t)(with_same ? twice / (2 * low_hz) + 1 : (twice + 2 * low_hz - 1) / (2 * low_hz));
+}
+
+/* Edge of ClockLow before edge j (from 0) of ClockHigh, and the time between. */
+static int64_t low_edge(const struct sim_module *const m, const int64_t j, unsigned *const ps)
+{
+    const wide low_hz = sim_clock_low_hz(m->card), high_hz = sim_clock_high_hz(m->card);
+    const wide twice = ((wide)2 * j + 1) * low_hz - high_hz;
+    const wide k = twice >= 0 ? twice / (2 * high_hz) : -1;
+    *ps = (unsigned)((((wide)2 * j + 1) * low_hz - ((wide)2 * k + 1) * high_hz) * 1000000000000ll /
+                     (2 * low_hz * high_hz));
+    return (int64_t)k;
+}
+
+/* ---- life
+ * --------------------------------------------------------------------------------------------------------------- */
+
+static int init(struct sim_module *const m)
+{
+    struct pwmgens *const p = m->state;
+    if (sim_clock_low_hz(m->card) == 0 || sim_clock_high_hz(m->card) == 0)
+        return HM2_ERR_RANGE;
+    p->count = m->md.instances < INSTANCES_MAX ? m->md.instances : INSTANCES_MAX;
+    p->enable_mask = p->count >= 32 ? UINT32_MAX : (1u << p->count) - 1;
+    return 0;
+}
+
+static void power_up(struct sim_module *const m)
+{
+    struct pwmgens *const p = m->state;
+    p->enable = 0;
+    p->edges = high_edges(m, m->clk, false);
+    p->reference = (struct pwm_reference){0};
+    for (unsigned i = 0; i < p->count; i++)
+        p->channels[i] = (struct pwm_channel){0};
+}
+
+static void run_to(struct pwmgens *const p, const int64_t edges)
+{
+    const int64_t n = edges - p->edges;
+    if (n <= 0)
+        return;
+    for (unsigned i = 0; i < p->count; i++) {
+        struct pwm_reference reference = p->reference;
+        pwm_run(&reference, &p->channels[i], n);
+    }
+    pwm_run(&p->reference, NULL, n);
+    p->edges = edges;
+}
+
+static void advance(struct sim_module *const m, const int64_t clk)
+{
+    run_to(m->state, high_edges(m, clk, false));
+}
+
+/* ---- registers
+ * ------------------------------------------------------------------------------------------------------------ */
+
+static uint32_t read(struct sim_module *const m, const unsigned page, const unsigned low, uint32_t *const undriven)
+{
+    const struct pwmgens *const p = m->state;
+    (void)low;
+    *undriven = page == PAGE_ENABLE ? 0 : UINT32_MAX;
+    return page == PAGE_ENABLE ? p->enable : 0;
+}
+
+static void write(struct sim_module *const m, const unsigned page, const unsigned low, const uint32_t value)
+{
+    struct pwmgens *const p = m->state;
+    const unsigned i = low / 4;
+    run_to(p, high_edges(m, m->clk, true));
+    if (page == PAGE_VALUE && i < p->count)
+        pwm_value_write(&p->channels[i], value);
+    else if (page == PAGE_MODE && i < p->count)
+        pwm_mode_write(&p->channels[i], value);
+    else if (page == PAGE_PWM_RATE)
+        pwm_rate_write(&p->reference.pwm, (uint16_t)value);
+    else if (page == PAGE_PDM_RATE)
+        pwm_rate_write(&p->reference.pdm, (uint16_t)value);
+    else if (page == PAGE_ENABLE)
+        p->enable = value & p->enable_mask;
+}
+
+/* ---- outputs
+ * --------------------------------------------------------------------------------------------------------------- */
+
+static enum sim_level output(struct sim_module *const m, const unsigned unit, const uint8_t pin)
+{
+    const struct pwmgens *const p = m->state;
+    if (unit >= p->count)
+        return SIM_LOW;
+    if (pin == PIN_ENABLE) /* the pin is active low, and the register bit is not a gate (3.6) */
+        return p->enable >> unit & 1u ? SIM_LOW : SIM_HIGH;
+    if (pin != PIN_A && pin != PIN_B)
+        return SIM_LOW;
+    return pwm_output(&p->channels[unit], pin == PIN_A ? PWM_PIN_A : PWM_PIN_B) ? SIM_HIGH : SIM_LOW;
+}
+
+static void trace(struct sim_module *const m, const unsigned unit, const uint8_t pin, const int64_t from,
+                  const int64_t to, void (*const report)(void *context, int64_t clk, unsigned ps, enum sim_level level),
+                  void *const context)
+{
+    const struct pwmgens *const p = m->state;
+    (void)from;
+    if (unit >= p->count || (pin != PIN_A && pin != PIN_B))
+        return; /* the enable pins change with a write only */
+    const enum pwm_pin which = pin == PIN_A ? PWM_PIN_A : PWM_PIN_B;
+    struct pwm_reference reference = p->reference;
+    struct pwm_channel channel = p->channels[unit];
+    const int64_t end = high_edges(m, to, false);
+    for (int64_t edge = p->edges; edge < end;) {
+        const bool before = pwm_output(&channel, which);
+        edge += pwm_run_to_change(&reference, &channel, which, end - edge);
+        const bool after = pwm_output(&channel, which);
+        unsigned ps = 0;
+        const int64_t clk = low_edge(m, edge - 1, &ps);
+        if (after != before)
+            report(context, clk, ps, after ? SIM_HIGH : SIM_LOW);
+    }
+}
+
+const struct sim_module_ops sim_pwmgen_ops = {
+    .gtag = HM2_GTAG_PWMGEN,
+    .name = "PWMGen",
+    .pages = PAGES,
+    .state_size = sizeof(struct pwmgens),
+    .init = init,
+    .power_up = power_up,
+    .advance = advance,
+    .read = read,
+    .write = write,
+    .output = output,
+    .trace = trace,
+};
