@@ -114,7 +114,8 @@ static int rig_peek(struct hm2_setup *const setup, const uint16_t address, const
 {
     const struct module_rig *const rig = setup->access;
     for (unsigned i = 0; i < words; i++)
-        values[i] = rig->readable[(address / 4u + i) % 0x4000u];
+        values[i] = rig->card ? sim_card_read(rig->card, rig->clk, (uint16_t)(address + 4u * i), NULL)
+                              : rig->readable[(address / 4u + i) % 0x4000u];
     return rig->peek_error;
 }
 
@@ -214,6 +215,8 @@ void rig_add_all(struct module_rig *const rig)
 static void write_register(struct module_rig *const rig, const uint16_t address, const uint32_t value)
 {
     rig->written[address / 4u] = value;
+    if (rig->card)
+        sim_card_write(rig->card, rig->clk, address, value);
     assert_true(rig->logged < RIG_LOG);
     rig->log[rig->logged++] = (struct rig_write){address, value};
 }
@@ -233,13 +236,18 @@ static void do_write(struct module_rig *const rig, const struct lbp16_command *c
     }
 }
 
+static uint32_t read_register(const struct module_rig *const rig, const uint16_t address)
+{
+    return rig->card ? sim_card_read(rig->card, rig->clk, address, NULL) : rig->readable[address / 4u];
+}
+
 static void do_read(const struct module_rig *const rig, const struct lbp16_command *const command, uint8_t *const out)
 {
     for (unsigned i = 0; i < command->count; i++) {
         const size_t step = command->increment ? i * lbp16_item_bytes(command->size) : 0;
         const uint16_t address = (uint16_t)(command->address + step);
         if (command->space == LBP16_SPACE_HM2)
-            hm2_put_le32(out + 4u * i, rig->readable[address / 4u]);
+            hm2_put_le32(out + 4u * i, read_register(rig, address));
         else if (command->space == LBP16_SPACE_TIMER && address < LBP16_TIMER_BYTES)
             hm2_put_le16(out + 2u * i, rig->timer[address / 2u]);
         else if (command->space == LBP16_SPACE_CONTROL && address == LBP16_CONTROL_RX_UDP)
@@ -336,6 +344,7 @@ void rig_write_out(struct module_rig *const rig)
 void rig_cycle(struct module_rig *const rig)
 {
     rig->cycle.now_ns += rig->cycle.period_ns;
+    rig->clk += rig->cycle.period_ns * rig->idrom.clock_low_hz / 1000000000;
     rig_read(rig);
     rig_write_out(rig);
 }

@@ -4,7 +4,8 @@
  * cycles in virtual time. No board and no link: the rig answers the plan's datagrams itself.
  *
  * What a module writes lands in `written`, what it reads comes from `readable`; both are by register address, and
- * neither changes the other (many registers read something else than what was written).
+ * neither changes the other (many registers read something else than what was written). With `card` set, registers are
+ * those of that simulated card instead, at clock `clk`, which rig_cycle() lets run by one period.
  *
  *     struct module_rig *rig = rig_new(rig_image_7i96s(), "num_leds=2");
  *     rig_add(rig, &hm2_watchdog_type);
@@ -18,6 +19,7 @@
 #define MODULE_RIG_H
 
 #include <hm2/module.h>
+#include <hm2/sim.h>
 
 #define RIG_MODULES   32u
 #define RIG_LOG       512u
@@ -71,7 +73,9 @@ struct module_rig {
     struct hm2_module modules[RIG_MODULES];
     uint32_t noticed[RIG_MODULES][HM2_NOTICES];
     struct hm2_cycle cycle;
-    /* the "card" */
+    struct sim_card *card; /* or NULL; the test's own */
+    int64_t clk;
+    /* the "card" otherwise */
     uint32_t readable[0x4000], written[0x4000]; /* [address / 4] */
     uint16_t timer[LBP16_TIMER_BYTES / 2];      /* space 4: plain memory */
     uint16_t rx_udp;

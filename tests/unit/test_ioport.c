@@ -4,6 +4,7 @@
 #include "idrom_files.h"
 #include "module_rig.h"
 #include "module_types.h"
+#include "random.h"
 
 #define DATA(port)       (uint16_t)(0x1000 + 4 * (port))
 #define DIRECTION(port)  (uint16_t)(0x1100 + 4 * (port))
@@ -345,6 +346,46 @@ static void settings_and_the_recorded_truth_table_agree(void **state)
     free(table);
 }
 
+/* The settings of all free pins at random, on the simulated card: pads and levels are what the settings promise. */
+static void pads_of_the_simulated_card_are_what_the_settings_promise(void **state)
+{
+    (void)state;
+    static const char *const settings[4] = {"is_output", "out", "invert_output", "is_opendrain"};
+    const struct sim_card_options options = {.profile = "7i96s", .seed = 1};
+    struct sim_card *card;
+    struct module_rig *const rig = rig_new(rig_image_7i96s(), "");
+    struct random random = {.state = 7};
+    assert_int_equal(sim_card_new(&card, &options, &rig->diag), 0);
+    rig->card = card;
+    (void)rig_add(rig, &hm2_ioport_type);
+    rig_start(rig);
+    for (unsigned round = 0; round < 50; round++) {
+        unsigned chosen[51];
+        for (unsigned io = 0; io < 51; io++) {
+            chosen[io] = random_below(&random, 16);
+            for (unsigned i = 0; i < 4; i++) {
+                char name[64];
+                (void)snprintf(name, sizeof name, "gpio.%03u.%s", io, settings[i]);
+                rig_set(rig, name, chosen[io] >> i & 1u);
+            }
+        }
+        rig_cycles(rig, ALL_TURNS + 1);
+        for (unsigned io = 0; io < 51; io++) {
+            const unsigned output = chosen[io] & 1u, driven = (chosen[io] >> 1 ^ chosen[io] >> 2) & 1u,
+                           released = !output || ((chosen[io] >> 3 & 1u) && driven);
+            char name[64];
+            (void)snprintf(name, sizeof name, "gpio.%03u.in", io);
+            const enum sim_level expected = released ? SIM_FLOAT : driven ? SIM_HIGH : SIM_LOW;
+            if (sim_card_pad(card, io) != expected)
+                fail_msg("round %u, I/O %u: pad %d, expected %d", round, io, (int)sim_card_pad(card, io),
+                         (int)expected);
+            assert_true(rig_get(rig, name) == (released || driven ? 1.0 : 0.0));
+        }
+    }
+    rig_free(rig);
+    sim_card_free(card);
+}
+
 static void ports_that_contradict_the_header_are_refused(void **state)
 {
     (void)state;
@@ -373,6 +414,7 @@ int main(void)
         cmocka_unit_test(an_alias_that_is_taken_is_a_warning_only),
         cmocka_unit_test(a_pin_of_two_modules_is_refused_with_both_names),
         cmocka_unit_test(settings_and_the_recorded_truth_table_agree),
+        cmocka_unit_test(pads_of_the_simulated_card_are_what_the_settings_promise),
         cmocka_unit_test(ports_that_contradict_the_header_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
