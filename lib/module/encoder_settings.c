@@ -141,8 +141,11 @@ static int add_timer(struct hm2_module *const module, struct hm2_setup *const se
     int err = setup->poke(setup, address, 1, &value);
     if (!err)
         err = setup->peek(setup, address, 1, &value);
-    if (err || value != 0)
-        return err;
+    if (err < 0)
+        return hm2_diag_add(setup->diag, err, "the timer register of %s at 0x%04X cannot be read: %s",
+                            module->type->name, address, hm2_strerror(err));
+    if (value != 0)
+        return 0;
     return hm2_timer_add(&ctx->timer, module, setup, REG_TIMER);
 }
 
