@@ -71,10 +71,10 @@ static int run_delf(struct hal_session *const session, char *const *const args, 
 static int run_start(struct hal_session *const session, char *const *const args, const size_t count,
                      struct hm2_diag *const diag)
 {
-    (void)session;
     (void)args;
     (void)count;
-    return halhost_start(diag);
+    return session->options.threads ? halhost_start(diag)
+                                    : hm2_diag_add(diag, HM2_ERR_STATE, "threads are not available here");
 }
 
 static int run_stop(struct hal_session *const session, char *const *const args, const size_t count,

@@ -26,8 +26,8 @@ struct hal_session_options {
     /* Wait until CLOCK_MONOTONIC shows until_ns; 0 only asks for an interruption that is pending. NULL: `run` returns
      * at once. */
     enum hal_wait (*wait)(void *context, int64_t until_ns);
-    /* Open a file for `save` and `histogram`, and read one for `source`. NULL = refused. */
-    bool files;
+    bool files;   /* `source` may read files, `save` and `histogram` may write them */
+    bool threads; /* `start` may start threads */
     void *context;
     bool json; /* `show` prints JSON */
 };

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * `loadrt threads name1=... period1=... [fp1=...] ...` as in LinuxCNC: up to three threads, fastest first; the first
- * is called "thread1" and has 1 ms when nothing is said. The list ends at the first of the others without a period.
+ * is called "thread1" and has 1 ms when nothing is said. A thread without a period, which LinuxCNC leaves out without
+ * a word, is an error here.
  */
 #include "state.h"
 

@@ -358,6 +358,7 @@ static int run_host(const struct arguments *const arguments)
         .environment = on_environment,
         .wait = wait_until,
         .files = true,
+        .threads = true,
         .json = arguments->json,
     };
     struct hm2_diag diag = {0};
