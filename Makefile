@@ -58,7 +58,7 @@ FUZZERS := $(sort $(patsubst tests/fuzz/%.c,%,$(wildcard tests/fuzz/fuzz_*.c)))
 BENCHES := $(sort $(patsubst tests/bench/%.c,%,$(wildcard tests/bench/bench_*.c)))
 UNIT_HELPERS := $(sort $(filter-out tests/unit/test_%.c,$(wildcard tests/unit/*.c)))
 SYSTEM_HELPERS := $(sort $(filter-out tests/system/check_%.c,$(wildcard tests/system/*.c)))
-MAN_PAGES := $(sort $(wildcard man/*.[0-9]))
+MAN_PAGES = $(sort $(wildcard man/*.[0-9])) $(BUILDDIR)/man/hm2_lbp16.9
 
 # hm2host's prompt is better with libedit, and works without.
 EDIT_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libedit 2>/dev/null)
@@ -86,7 +86,7 @@ BENCH_BIN := $(addprefix $(BUILDDIR)/bench/,$(BENCHES))
 .SECONDARY:
 .DELETE_ON_ERROR:
 
-all: $(LIB_A) $(LIB_SO) $(SIM_A) $(PROGRAMS) $(COMPONENT_SO) $(BUILDDIR)/libhm2.pc ## build libraries, programs, components
+all: $(LIB_A) $(LIB_SO) $(SIM_A) $(PROGRAMS) $(COMPONENT_SO) $(BUILDDIR)/libhm2.pc $(BUILDDIR)/man/hm2_lbp16.9 ## build libraries, programs, components
 
 help: ## this list
 	@echo 'make [TARGET] [BUILDDIR=build] [CC=gcc] [SANITIZE=-fsanitize=address,undefined] [V=1]'
@@ -156,6 +156,12 @@ $(foreach c,$(COMPONENTS),$(eval $(call component_rule,$(c))))
 $(BUILDDIR)/test-components/%.so: $(BUILDDIR)/obj/tests/components/%.o $(call obj,$(COMPONENT_COMMON)) $(LIB_A)
 	$(component_link)
 
+# The page lists the points from the tables that create them.
+$(BUILDDIR)/man/%: man/%.in $(BUILDDIR)/hm2points
+	@mkdir -p $(@D)
+	$(call say,GEN,$@)$(BUILDDIR)/hm2points --mdoc > $@.points && \
+		sed -e '/@POINTS@/{r $@.points' -e 'd}' $< > $@ && rm $@.points
+
 # ---- tests --------------------------------------------------------------------------------------------------------
 
 CMOCKA_LIBS ?= -lcmocka
@@ -171,9 +177,10 @@ $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPE
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(LIB_A) $(CHECK_LIBS) -lm \
 		-lpthread
 
-$(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(SIM_A) $(LIB_A)
+$(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(HOST_A) $(LIB_A)
 	@mkdir -p $(@D)
-	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(LIB_A) -lm -lpthread -ldl
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) -Wl,--whole-archive $(HOST_A) \
+		-Wl,--no-whole-archive $(LIB_A) -rdynamic -lm -lpthread -ldl
 
 # These load the test components.
 $(BUILDDIR)/unit/test_halhost $(BUILDDIR)/system/check_hm2host: | $(TEST_COMPONENT_SO)

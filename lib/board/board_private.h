@@ -29,7 +29,6 @@ struct board_points {
     hm2_bit_t *rtt_reset;
 };
 
-extern const struct hm2_point_group board_point_groups[];
 
 int board_points_bind(struct hm2_board *board, struct hm2_binder *binder, struct hm2_diag *diag);
 

@@ -46,3 +46,8 @@ size_t hm2_board_describe_pins(const struct hm2_board *const board, char *const 
     }
     return used;
 }
+
+struct hm2_plan_sizes hm2_board_sizes(const struct hm2_board *const board)
+{
+    return hm2_plan_sizes(board->plan);
+}

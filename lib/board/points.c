@@ -30,10 +30,15 @@ static const struct hm2_point points[] = {
     P(rtt_reset, "rtt-reset", HM2_BIT, HM2_PIN_IO, 0, "", "set to 1 to start the shortest and longest anew"),
 };
 
-const struct hm2_point_group board_point_groups[] = {
+static const struct hm2_point_group groups[] = {
     {"", points, sizeof points / sizeof points[0], NULL},
     {NULL, NULL, 0, NULL},
 };
+
+const struct hm2_point_group *hm2_board_point_groups(void)
+{
+    return groups;
+}
 
 int board_points_bind(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
 {

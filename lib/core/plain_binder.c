@@ -106,7 +106,7 @@ static bool grow_objects(struct hm2_plain_binder *const plain)
     if (plain->count < plain->capacity)
         return true;
     const size_t wanted = plain->capacity ? plain->capacity * 2 : 128;
-    struct hm2_plain_object **const fresh = realloc(plain->objects, wanted * sizeof(*fresh));
+    struct hm2_plain_object **const fresh = realloc(plain->objects, wanted * sizeof(void *));
     if (!fresh)
         return false;
     plain->objects = fresh;

@@ -20,6 +20,7 @@ enum { REG_BASE_RATE, REG_PHASE, REG_CONTROL0, REG_CONTROL1, REG_TIMERS12, REG_T
 
 struct timer {
     hm2_float_t *offset_us;
+    double for_us; /* offset that the register was computed from */
 };
 
 struct dpll {
@@ -27,9 +28,10 @@ struct dpll {
     hm2_u32_t *time_const, *plimit, *dds_size, *prescale;
     struct timer timer[TIMERS];
     double clock_hz;
-    /* what base rate and prescale were computed from */
+    /* What the registers were computed from. */
     double for_khz;
-    uint32_t for_dds_size;
+    uint32_t for_dds_size, for_time_const, for_plimit;
+    int64_t for_period_ns; /* 0 = never computed */
     struct hm2_window sync, control1_read;
     struct hm2_section base_rate, phase, control0, control1, timers12, timers34;
 };
@@ -130,24 +132,35 @@ static double loop_khz(const struct hm2_module *const module, const struct hm2_c
     return from_period;
 }
 
-/* The accumulator of dds_size bits gains base_rate every prescale clocks and overflows once a period. */
-static void set_rate(struct dpll *const ctx, const double khz, const uint32_t dds_size)
+/* False for a NaN: what cannot be used is kept as NaN, and so reported in every cycle. */
+static bool same(const double a, const double b)
 {
-    const uint32_t bits = dds_size >= 32u && dds_size <= 62u ? dds_size : DDS_BITS;
+    return a <= b && a >= b;
+}
+
+/* The accumulator of dds_size bits gains base_rate every prescale clocks and overflows once a period. */
+static void set_rate(const struct hm2_module *const module, const struct hm2_cycle *const cycle)
+{
+    struct dpll *const ctx = module->context;
+    const double khz = loop_khz(module, cycle);
+    ctx->for_khz = same(*ctx->base_freq_khz, khz) ? khz : NAN;
+    ctx->for_dds_size = *ctx->dds_size;
+    ctx->for_plimit = *ctx->plimit;
+    const uint32_t bits = ctx->for_dds_size >= 32u && ctx->for_dds_size <= 62u ? ctx->for_dds_size : DDS_BITS;
     const double span = (double)((uint64_t)1 << bits);
     const uint32_t wanted = hm2_trunc_u32(1073741824.0 * ctx->clock_hz / (span * khz * 1000.0));
     const uint32_t prescale = wanted < 1 ? 1 : wanted > PRESCALE_MAX ? PRESCALE_MAX : wanted;
     *ctx->prescale = prescale;
     hm2_section_set(&ctx->base_rate, 0, hm2_trunc_u32(khz * 1000.0 * span * prescale / ctx->clock_hz));
-    ctx->for_khz = khz;
-    ctx->for_dds_size = dds_size;
+    hm2_section_set(&ctx->control0, 0, prescale << 24 | limited(module, ctx->for_plimit, PLIMIT_MAX));
 }
 
 /* An advance in 1/65536 periods (register map 3.15); through a signed type, the usual offset is negative. */
 static uint32_t timer_value(const struct hm2_module *const module, const unsigned number, const double per_us)
 {
-    const struct dpll *const ctx = module->context;
+    struct dpll *const ctx = module->context;
     const double offset_us = *ctx->timer[number].offset_us;
+    ctx->timer[number].for_us = isfinite(offset_us) ? offset_us : NAN;
     if (!isfinite(offset_us)) {
         hm2_notice(module, HM2_NOTICE_VALUE_INVALID, number, offset_us);
         return 0;
@@ -155,20 +168,39 @@ static uint32_t timer_value(const struct hm2_module *const module, const unsigne
     return (uint32_t)hm2_trunc_s32(-offset_us * per_us) & 0xFFFFu;
 }
 
+static void set_registers(const struct hm2_module *const module, const struct hm2_cycle *const cycle)
+{
+    struct dpll *const ctx = module->context;
+    const double per_us = 65536e3 / (double)cycle->period_ns;
+    uint32_t value[TIMERS];
+    set_rate(module, cycle);
+    ctx->for_period_ns = cycle->period_ns;
+    ctx->for_time_const = *ctx->time_const;
+    hm2_section_set(&ctx->control1, 0, limited(module, ctx->for_time_const, TIME_CONST_MAX) << 16);
+    for (unsigned i = 0; i < TIMERS; i++)
+        value[i] = timer_value(module, i, per_us);
+    hm2_section_set(&ctx->timers12, 0, value[1] << 16 | value[0]);
+    hm2_section_set(&ctx->timers34, 0, value[3] << 16 | value[2]);
+}
+
+static bool is_unchanged(const struct dpll *const ctx, const struct hm2_cycle *const cycle)
+{
+    bool unchanged = cycle->period_ns == ctx->for_period_ns && *ctx->plimit == ctx->for_plimit &&
+                     *ctx->time_const == ctx->for_time_const && *ctx->dds_size == ctx->for_dds_size &&
+                     ctx->for_plimit <= PLIMIT_MAX && ctx->for_time_const <= TIME_CONST_MAX &&
+                     same(*ctx->base_freq_khz, ctx->for_khz);
+    for (unsigned i = 0; i < TIMERS; i++)
+        unchanged = unchanged && same(*ctx->timer[i].offset_us, ctx->timer[i].for_us);
+    return unchanged;
+}
+
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct dpll *const ctx = module->context;
     if (!ctx)
         return;
-    const double khz = loop_khz(module, cycle);
-    const double per_us = 65536e3 / (double)cycle->period_ns;
-    const uint32_t dds_size = *ctx->dds_size;
-    if (!(khz >= ctx->for_khz && khz <= ctx->for_khz) || dds_size != ctx->for_dds_size)
-        set_rate(ctx, khz, dds_size);
-    hm2_section_set(&ctx->control0, 0, *ctx->prescale << 24 | limited(module, *ctx->plimit, PLIMIT_MAX));
-    hm2_section_set(&ctx->control1, 0, limited(module, *ctx->time_const, TIME_CONST_MAX) << 16);
-    hm2_section_set(&ctx->timers12, 0, timer_value(module, 1, per_us) << 16 | timer_value(module, 0, per_us));
-    hm2_section_set(&ctx->timers34, 0, timer_value(module, 3, per_us) << 16 | timer_value(module, 2, per_us));
+    if (!is_unchanged(ctx, cycle))
+        set_registers(module, cycle);
     if (cycle->writes < START_UP_WRITES) {
         hm2_section_touch(&ctx->phase);
         hm2_section_touch(&ctx->control0); /* writing it clears the filtered phase error (tests/data/hm2dpll) */

@@ -6,9 +6,8 @@
  * A pad is driven when its open drain bit is set and the data are 0, whatever the direction says (tests/data/ioport),
  * so polarity and source are written before open drain, and the direction last.
  *
- * Pins act in every cycle. Parameters cannot be linked to signals, only a person sets them; they are looked at in
- * turns (levels.h), a few in each cycle and all of them within two or three cycles per port, which keeps the cycle
- * short.
+ * Pins act in every cycle. Parameters cannot be linked to signals, only a person sets them; a few I/Os are looked at in
+ * each cycle, and when one has changed, all of them.
  */
 #include <stdio.h>
 
@@ -18,34 +17,42 @@
 
 enum { REG_DATA, REG_DIRECTION, REG_ALT_SOURCE, REG_OPEN_DRAIN, REG_INVERT };
 
-/* Pins and parameters of one I/O; NULL where the I/O has none. */
-struct io_points {
-    hm2_bit_t *out, *is_output;            /* pins that no module owns; others have out on a constant 0 */
-    hm2_bit_t *invert_output, *open_drain; /* these and outputs of modules */
+#define LOOKS_PER_CYCLE 8u /* I/Os whose parameters are looked at in a cycle */
+
+struct gpio_out {
+    hm2_bit_t *out;
+};
+
+/* Parameters of an I/O that can be set up. */
+struct io_setup {
+    hm2_bit_t *invert_output, *open_drain;
+    hm2_bit_t *is_output; /* of pins that no module owns; others have it on a constant 0 */
+    uint8_t port, bit;
+    uint8_t seen; /* the three, as they were looked at last */
 };
 
 /* One word per register and port, bit = I/O of the port. */
 struct port {
     uint32_t present;              /* bits of the width */
-    unsigned gpio_first, gpio_end; /* bits from the lowest to behind the highest of gpio; equal when there is none */
     uint32_t gpio;                 /* not owned by a module */
-    uint32_t adjustable;           /* has invert_output and is_opendrain */
+    unsigned gpio_first, gpio_end; /* bits from the lowest to behind the highest of gpio; equal when there is none */
     uint32_t outputs;              /* outputs of modules */
     uint32_t immediate;            /* those of them that are driven from load on */
     uint32_t shown;                /* levels as the pins have them */
-    /* what the parameters say */
-    uint32_t is_output, invert_output, open_drain;
+    uint32_t is_output, invert_output, open_drain; /* what the parameters say */
     struct hm2_level *levels;
-    struct io_points *points;
+    struct gpio_out *out; /* of other pins on a constant 0 */
 };
 
 struct ioport {
     struct port *ports;
     unsigned count;
-    unsigned turn_port, turn, turns; /* whose levels and parameters are looked at next, and turns of a port */
-    hm2_bit_t nothing;               /* stays 0 */
-    bool first_written;              /* deferred outputs have their direction */
-    bool held_off;                   /* the watchdog has cleared direction and open drain */
+    unsigned turn_port, turn, turns; /* whose levels are written next, and turns of a port */
+    struct io_setup *setups;
+    unsigned setup_count, next_look;
+    hm2_bit_t nothing;  /* stays 0 */
+    bool first_written; /* deferred outputs have their direction */
+    bool held_off;      /* the watchdog has cleared direction and open drain */
     struct hm2_window read, write;
     struct hm2_section invert, alt_source, open_drain, direction;
 };
@@ -55,25 +62,29 @@ static const struct hm2_point level_points[] = {
     HM2_POINT(struct hm2_level, inverse, "###.in_not", HM2_BIT, HM2_PIN_OUT, 0, "", "inverse of in"),
 };
 
-static const struct hm2_point gpio_points[] = {
-    HM2_POINT(struct io_points, out, "###.out", HM2_BIT, HM2_PIN_IN, 0, "", "value to drive"),
-    HM2_POINT(struct io_points, is_output, "###.is_output", HM2_BIT, HM2_PARAM_RW, 0, "", "1 = output, 0 = input"),
+static const struct hm2_point out_points[] = {
+    HM2_POINT(struct gpio_out, out, "###.out", HM2_BIT, HM2_PIN_IN, 0, "", "value to drive"),
+};
+
+static const struct hm2_point direction_points[] = {
+    HM2_POINT(struct io_setup, is_output, "###.is_output", HM2_BIT, HM2_PARAM_RW, 0, "", "1 = output, 0 = input"),
 };
 
 static const struct hm2_point output_points[] = {
-    HM2_POINT(struct io_points, invert_output, "###.invert_output", HM2_BIT, HM2_PARAM_RW, 0, "",
+    HM2_POINT(struct io_setup, invert_output, "###.invert_output", HM2_BIT, HM2_PARAM_RW, 0, "",
               "the card inverts what it drives"),
-    HM2_POINT(struct io_points, open_drain, "###.is_opendrain", HM2_BIT, HM2_PARAM_RW, 0, "",
+    HM2_POINT(struct io_setup, open_drain, "###.is_opendrain", HM2_BIT, HM2_PARAM_RW, 0, "",
               "drive low only; high = released"),
 };
 
-enum { GROUP_LEVEL, GROUP_GPIO, GROUP_OUTPUT };
+enum { GROUP_LEVEL, GROUP_OUT, GROUP_DIRECTION, GROUP_OUTPUT };
 
 #define ROWS(table) table, sizeof(table) / sizeof(table)[0]
 
 static const struct hm2_point_group groups[] = {
     [GROUP_LEVEL] = {"gpio", ROWS(level_points), NULL},
-    [GROUP_GPIO] = {"gpio", ROWS(gpio_points), "pins that no module uses"},
+    [GROUP_OUT] = {"gpio", ROWS(out_points), "pins that no module uses"},
+    [GROUP_DIRECTION] = {"gpio", ROWS(direction_points), "pins that no module uses"},
     [GROUP_OUTPUT] = {"gpio", ROWS(output_points), "pins that no module uses and outputs of modules"},
     {NULL, NULL, 0, NULL},
 };
@@ -127,30 +138,43 @@ static void alias_output(const struct hm2_setup *const setup, const unsigned io)
     }
 }
 
-static int bind_io(const struct hm2_setup *const setup, struct port *const port, const unsigned bit, const unsigned io)
+/* Parameters of an I/O, which has a direction to choose when no module owns it. */
+static int bind_setup(const struct hm2_setup *const setup, struct ioport *const ctx, const unsigned io)
+{
+    struct io_setup *const row = &ctx->setups[ctx->setup_count++];
+    row->port = (uint8_t)(io / setup->idrom->port_width);
+    row->bit = (uint8_t)(io % setup->idrom->port_width);
+    row->is_output = &ctx->nothing;
+    int err = 0;
+    if (!setup->pins[io].owner)
+        err = hm2_bind_group(setup, &groups[GROUP_DIRECTION], row, io);
+    if (err == 0)
+        err = hm2_bind_group(setup, &groups[GROUP_OUTPUT], row, io);
+    if (err == 0)
+        alias_output(setup, io);
+    return err;
+}
+
+static int bind_io(const struct hm2_setup *const setup, struct ioport *const ctx, const unsigned io)
 {
     const struct hm2_pin *const pin = &setup->pins[io];
+    struct port *const port = &ctx->ports[io / setup->idrom->port_width];
+    const unsigned bit = io % setup->idrom->port_width;
     const uint32_t mask = 1u << bit;
     int err = hm2_bind_group(setup, &groups[GROUP_LEVEL], &port->levels[bit], io);
     port->present |= mask;
-    if (pin->owner && is_output(pin)) {
-        port->outputs |= mask;
-        if (pin->immediate)
-            port->immediate |= mask;
-    }
+    port->out[bit].out = &ctx->nothing;
     if (err == 0 && !pin->owner) {
         port->gpio |= mask;
         port->gpio_first = port->gpio == mask ? bit : port->gpio_first;
         port->gpio_end = bit + 1;
-        err = hm2_bind_group(setup, &groups[GROUP_GPIO], &port->points[bit], io);
+        err = hm2_bind_group(setup, &groups[GROUP_OUT], &port->out[bit], io);
     }
-    if (err == 0 && (port->gpio | port->outputs) & mask) {
-        port->adjustable |= mask;
-        err = hm2_bind_group(setup, &groups[GROUP_OUTPUT], &port->points[bit], io);
-        if (err == 0)
-            alias_output(setup, io);
+    if (pin->owner && is_output(pin)) {
+        port->outputs |= mask;
+        port->immediate |= pin->immediate ? mask : 0;
     }
-    return err;
+    return err == 0 && (port->gpio | port->outputs) & mask ? bind_setup(setup, ctx, io) : err;
 }
 
 static int add_registers(struct ioport *const ctx, const struct hm2_md *const md, const struct hm2_setup *const setup)
@@ -187,6 +211,28 @@ static void apply(struct ioport *const ctx, const unsigned number)
     hm2_section_set(&ctx->direction, number, direction);
 }
 
+/* Memory, and what belongs to which port. */
+static struct ioport *allocate(const struct hm2_setup *const setup)
+{
+    const struct hm2_idrom *const idrom = setup->idrom;
+    struct ioport *const ctx = hm2_setup_alloc(setup, sizeof *ctx);
+    struct port *const ports = hm2_setup_alloc(setup, idrom->io_ports * sizeof *ports);
+    struct hm2_level *const levels = hm2_setup_alloc(setup, idrom->pin_count * sizeof *levels);
+    struct gpio_out *const out = hm2_setup_alloc(setup, idrom->pin_count * sizeof *out);
+    struct io_setup *const setups = hm2_setup_alloc(setup, idrom->pin_count * sizeof *setups);
+    if (!ctx || !ports || !levels || !out || !setups)
+        return NULL;
+    ctx->ports = ports;
+    ctx->count = idrom->io_ports;
+    ctx->turns = hm2_turns(idrom->port_width);
+    ctx->setups = setups;
+    for (unsigned number = 0; number < ctx->count; number++) {
+        ports[number].levels = &levels[number * idrom->port_width];
+        ports[number].out = &out[number * idrom->port_width];
+    }
+    return ctx;
+}
+
 static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 {
     const struct hm2_idrom *const idrom = setup->idrom;
@@ -194,29 +240,16 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
         return hm2_diag_add(setup->diag, HM2_ERR_MISMATCH,
                             "the IOPort module has %u instances, but the IDROM header says %u ports",
                             module->md->instances, (unsigned)idrom->io_ports);
-    struct ioport *const ctx = hm2_setup_alloc(setup, sizeof *ctx);
-    struct port *const ports = hm2_setup_alloc(setup, idrom->io_ports * sizeof *ports);
-    struct hm2_level *const levels = hm2_setup_alloc(setup, idrom->pin_count * sizeof *levels);
-    struct io_points *const points = hm2_setup_alloc(setup, idrom->pin_count * sizeof *points);
-    if (!ctx || !ports || !levels || !points)
+    struct ioport *const ctx = allocate(setup);
+    if (!ctx)
         return HM2_ERR_NOMEM;
     module->context = ctx;
-    ctx->ports = ports;
-    ctx->count = idrom->io_ports;
-    ctx->turns = hm2_turns(idrom->port_width);
-    for (unsigned io = 0; io < idrom->pin_count; io++)
-        points[io].out = &ctx->nothing;
     int err = add_registers(ctx, module->md, setup);
+    for (unsigned io = 0; err == 0 && io < idrom->pin_count; io++)
+        err = bind_io(setup, ctx, io);
     for (unsigned number = 0; err == 0 && number < ctx->count; number++) {
-        const unsigned first = number * idrom->port_width;
-        ports[number].levels = &levels[first];
-        ports[number].points = &points[first];
-        for (unsigned bit = 0; err == 0 && bit < idrom->port_width; bit++)
-            err = bind_io(setup, &ports[number], bit, first + bit);
-        if (err == 0) {
-            hm2_section_set(&ctx->alt_source, number, ports[number].present & ~ports[number].gpio);
-            apply(ctx, number);
-        }
+        hm2_section_set(&ctx->alt_source, number, ctx->ports[number].present & ~ctx->ports[number].gpio);
+        apply(ctx, number);
     }
     return err;
 }
@@ -230,11 +263,13 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     for (unsigned number = 0; number < ctx->count; number++) {
         struct port *const port = &ctx->ports[number];
         const uint32_t levels = hm2_window_get(&ctx->read, number);
-        uint32_t which = levels ^ port->shown;
-        if (number == ctx->turn_port)
-            which |= HM2_TURN_MASK(ctx->turn);
+        const uint32_t turn = number == ctx->turn_port ? HM2_TURN_MASK(ctx->turn) : 0;
+        hm2_show_levels(port->levels, levels, ((levels ^ port->shown) | turn) & port->present);
         port->shown = levels;
-        hm2_show_levels(port->levels, levels, which & port->present);
+    }
+    if (++ctx->turn >= ctx->turns) {
+        ctx->turn = 0;
+        ctx->turn_port = ctx->turn_port + 1 < ctx->count ? ctx->turn_port + 1 : 0;
     }
 }
 
@@ -250,37 +285,49 @@ static void start(struct hm2_module *const module, const struct hm2_cycle *const
     }
 }
 
-static void read_parameters(struct port *const port, const uint32_t which)
+static uint8_t look(const struct io_setup *const row)
 {
-    uint32_t invert = 0, open_drain = 0, output = 0;
-    for (uint32_t left = port->adjustable & which; left; left &= left - 1) {
-        const unsigned bit = (unsigned)__builtin_ctz(left);
-        invert |= (uint32_t)*port->points[bit].invert_output << bit;
-        open_drain |= (uint32_t)*port->points[bit].open_drain << bit;
-    }
-    for (uint32_t left = port->gpio & which; left; left &= left - 1) {
-        const unsigned bit = (unsigned)__builtin_ctz(left);
-        output |= (uint32_t)*port->points[bit].is_output << bit;
-    }
-    port->invert_output = (port->invert_output & ~which) | invert;
-    port->open_drain = (port->open_drain & ~which) | open_drain;
-    port->is_output = (port->is_output & ~which) | output;
+    return (uint8_t)(*row->invert_output | *row->open_drain << 1 | *row->is_output << 2);
 }
 
-/* Everything at once: at the first write, and when the watchdog bit or was told to forget it. */
-static void read_all_parameters(struct ioport *const ctx)
+/* Take all parameters over: at the first write, when one has changed, and when the watchdog bit or was told to forget
+ * it. */
+static void take_parameters(struct ioport *const ctx)
 {
     for (unsigned number = 0; number < ctx->count; number++) {
-        read_parameters(&ctx->ports[number], UINT32_MAX);
-        apply(ctx, number);
+        struct port *const port = &ctx->ports[number];
+        port->invert_output = port->open_drain = port->is_output = 0;
     }
+    for (unsigned i = 0; i < ctx->setup_count; i++) {
+        struct io_setup *const row = &ctx->setups[i];
+        struct port *const port = &ctx->ports[row->port];
+        row->seen = look(row);
+        port->invert_output |= (row->seen & 1u) << row->bit;
+        port->open_drain |= (row->seen >> 1 & 1u) << row->bit;
+        port->is_output |= (row->seen >> 2 & 1u) << row->bit;
+    }
+    for (unsigned number = 0; number < ctx->count; number++)
+        apply(ctx, number);
+}
+
+/* Has one of the next few I/Os changed? */
+static bool parameters_changed(struct ioport *const ctx)
+{
+    const unsigned left = ctx->setup_count - ctx->next_look;
+    const unsigned end = left > LOOKS_PER_CYCLE ? ctx->next_look + LOOKS_PER_CYCLE : ctx->setup_count;
+    unsigned changed = 0;
+    for (const struct io_setup *row = &ctx->setups[ctx->next_look]; row < &ctx->setups[end]; row++)
+        changed |= (unsigned)look(row) ^ row->seen;
+    ctx->next_look = end < ctx->setup_count ? end : 0;
+    return changed != 0;
 }
 
 static uint32_t outputs(const struct port *const port)
 {
+    const struct gpio_out *const first = port->out + port->gpio_first;
     uint32_t data = 0;
-    for (unsigned bit = port->gpio_end; bit > port->gpio_first; bit--)
-        data = data << 1 | *port->points[bit - 1].out;
+    for (const struct gpio_out *at = port->out + port->gpio_end; at > first; at--)
+        data = data << 1 | *at[-1].out;
     return data << port->gpio_first;
 }
 
@@ -292,14 +339,9 @@ static void pack(struct hm2_module *const module, const struct hm2_cycle *const 
     if (cycle->writes == 0 || cycle->bitten != ctx->held_off) {
         ctx->first_written = true;
         ctx->held_off = cycle->bitten;
-        read_all_parameters(ctx);
-        return;
-    }
-    read_parameters(&ctx->ports[ctx->turn_port], HM2_TURN_MASK(ctx->turn));
-    apply(ctx, ctx->turn_port);
-    if (++ctx->turn >= ctx->turns) {
-        ctx->turn = 0;
-        ctx->turn_port = ctx->turn_port + 1 < ctx->count ? ctx->turn_port + 1 : 0;
+        take_parameters(ctx);
+    } else if (parameters_changed(ctx)) {
+        take_parameters(ctx);
     }
 }
 

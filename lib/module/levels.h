@@ -23,14 +23,12 @@ static inline void hm2_show_levels(const struct hm2_level *const levels, const u
 
 /*
  * Taking turns. A pin is written when its level changed, and otherwise once in a few cycles: a host may link a pin to a
- * signal at any time, and the signal shall soon show the level even if that never changes. The same turns serve for
- * looking at parameters, which only a person changes.
+ * signal at any time, and the signal shall soon show the level even if that never changes.
  */
-#define HM2_TURN_BITS       12u
-#define HM2_TURNS_PER_WORD  3u /* 3 * 12 bits cover a word */
+#define HM2_TURN_BITS       4u
 #define HM2_TURN_MASK(turn) ((uint32_t)((((uint64_t)1 << HM2_TURN_BITS) - 1u) << HM2_TURN_BITS * (turn)))
 
-/* Turns that a word of this width needs. */
+/* Turns that a word of this width (up to 32 bits) needs. */
 static inline unsigned hm2_turns(const unsigned width)
 {
     return (width + HM2_TURN_BITS - 1u) / HM2_TURN_BITS;

@@ -21,13 +21,12 @@ enum { REG_CONTROL, REG_FILTER_SELECT, REG_FILTERED, REG_RAW, REG_COUNTERS };
 #define CLOCKS_PER_STEP 4u    /* an input takes (divisor + 1) * 4 clocks */
 
 struct slow {
-    hm2_bit_t *slow;
+    hm2_bit_t *slow; /* of inputs that do not exist: a constant 0 */
 };
 
 struct counter {
     hm2_s32_t *count;
     hm2_bit_t *reset, *mode_4x;
-    uint8_t before;
 };
 
 struct instance {
@@ -35,8 +34,9 @@ struct instance {
     uint32_t width;                        /* scan_width, as the card says */
     uint32_t for_rate, for_fast, for_slow; /* parameters that the control word was computed from */
     uint32_t present;                      /* inputs that exist as pins */
-    uint32_t shown, shown_raw;             /* levels as the pins have them */
-    unsigned turn;
+    unsigned end;                          /* behind the highest of them */
+    uint32_t shown, shown_raw, counts;     /* levels as the pins have them, and counters as they were read last */
+    unsigned turn, turns;
     struct hm2_level filtered[MAX_INPUTS], raw[MAX_INPUTS];
     struct slow slow[MAX_INPUTS];
     struct counter counter[COUNTERS];
@@ -44,6 +44,7 @@ struct instance {
 
 struct scanned {
     uint32_t clock_hz, max_bits_per_s;
+    hm2_bit_t nothing; /* stays 0 */
     struct instance *instance;
     /* one word per instance */
     struct hm2_window filtered, raw, counters, filter_select;
@@ -108,6 +109,7 @@ static int bind_inputs(const struct hm2_setup *const setup, const struct hm2_poi
     for (unsigned i = 0; err == 0 && i < MAX_INPUTS; i++) {
         if (!(instance->present >> i & 1u))
             continue;
+        instance->end = i + 1;
         err = hm2_bind_item(setup, &groups[GROUP_FILTERED], &instance->filtered[i], unit, i);
         if (err == 0)
             err = hm2_bind_item(setup, &groups[GROUP_RAW], &instance->raw[i], unit, i);
@@ -133,11 +135,14 @@ static int setup_instance(const struct hm2_module *const module, struct hm2_setu
     instance->present = UINT32_MAX >> (MAX_INPUTS - instance->width);
     if (inputs == HM2_SCANNED_BY_WIDTH_AND_PIN)
         instance->present |= described(setup->idrom, module->md->gtag, unit);
+    for (unsigned i = 0; i < MAX_INPUTS; i++)
+        instance->slow[i].slow = &ctx->nothing;
     err = hm2_bind_group(setup, &module->type->groups[GROUP_MODULE], instance, unit);
     if (err == 0) {
         *instance->scan_width = instance->width;
         err = bind_inputs(setup, module->type->groups, instance, unit);
     }
+    instance->turns = hm2_turns(instance->end);
     return err;
 }
 
@@ -196,19 +201,27 @@ void hm2_scanned_start(struct hm2_module *const module, const struct hm2_cycle *
 {
     struct scanned *const ctx = module->context;
     (void)cycle;
-    for (unsigned unit = 0; unit < module->instances; unit++) {
-        struct instance *const instance = &ctx->instance[unit];
-        const uint32_t counts = hm2_window_get(&ctx->counters, unit);
-        for (unsigned i = 0; i < COUNTERS; i++)
-            instance->counter[i].before = (uint8_t)(counts >> 8 * i);
-    }
+    for (unsigned unit = 0; unit < module->instances; unit++)
+        ctx->instance[unit].counts = hm2_window_get(&ctx->counters, unit);
 }
 
-static void count(struct counter *const counter, const uint8_t now)
+/* Four counters of eight bits each; reset holds a count at 0. */
+static void count(struct instance *const instance, const uint32_t counts)
 {
-    const int8_t moved = (int8_t)(uint8_t)(now - counter->before);
-    counter->before = now;
-    *counter->count = *counter->reset ? 0 : (int32_t)((uint32_t)*counter->count + (uint32_t)moved);
+    for (unsigned i = 0; i < COUNTERS; i++) {
+        const struct counter *const counter = &instance->counter[i];
+        const int8_t moved = (int8_t)(uint8_t)((counts >> 8 * i) - (instance->counts >> 8 * i));
+        *counter->count = *counter->reset ? 0 : (int32_t)((uint32_t)*counter->count + (uint32_t)moved);
+    }
+    instance->counts = counts;
+}
+
+static bool is_reset(const struct instance *const instance)
+{
+    unsigned any = 0;
+    for (unsigned i = 0; i < COUNTERS; i++)
+        any |= *instance->counter[i].reset;
+    return any != 0;
 }
 
 void hm2_scanned_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -225,9 +238,9 @@ void hm2_scanned_unpack(struct hm2_module *const module, const struct hm2_cycle 
         hm2_show_levels(instance->raw, raw, ((raw ^ instance->shown_raw) | turn) & instance->present);
         instance->shown = filtered;
         instance->shown_raw = raw;
-        instance->turn = instance->turn + 1 < HM2_TURNS_PER_WORD ? instance->turn + 1 : 0;
-        for (unsigned i = 0; i < COUNTERS; i++)
-            count(&instance->counter[i], (uint8_t)(counts >> 8 * i));
+        if (counts != instance->counts || instance->turn == 0 || is_reset(instance))
+            count(instance, counts);
+        instance->turn = instance->turn + 1 < instance->turns ? instance->turn + 1 : 0;
     }
 }
 
@@ -268,20 +281,27 @@ static uint32_t modes_word(const struct instance *const instance)
     return word;
 }
 
+static void pack_parameters(const struct hm2_module *const module, const unsigned unit, const bool first)
+{
+    struct scanned *const ctx = module->context;
+    const struct instance *const instance = &ctx->instance[unit];
+    hm2_section_set(&ctx->modes, unit, modes_word(instance));
+    if (first || *instance->scan_rate != instance->for_rate || *instance->fast_scans != instance->for_fast ||
+        *instance->slow_scans != instance->for_slow)
+        hm2_section_set(&ctx->control, unit, control_word(module, unit));
+}
+
 void hm2_scanned_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct scanned *const ctx = module->context;
     for (unsigned unit = 0; unit < module->instances; unit++) {
         const struct instance *const instance = &ctx->instance[unit];
         uint32_t slow = 0;
-        for (uint32_t left = instance->present; left; left &= left - 1) {
-            const unsigned input = (unsigned)__builtin_ctz(left);
-            slow |= (uint32_t)*instance->slow[input].slow << input;
-        }
+        for (unsigned input = instance->end; input > 0; input--)
+            slow = slow << 1 | *instance->slow[input - 1].slow;
         hm2_window_set(&ctx->filter_select, unit, slow);
-        hm2_section_set(&ctx->modes, unit, modes_word(instance));
-        if (cycle->writes == 0 || *instance->scan_rate != instance->for_rate ||
-            *instance->fast_scans != instance->for_fast || *instance->slow_scans != instance->for_slow)
-            hm2_section_set(&ctx->control, unit, control_word(module, unit));
+        /* Parameters are only set by people: looked at in one turn of a round. */
+        if (instance->turn == 0 || cycle->writes == 0)
+            pack_parameters(module, unit, cycle->writes == 0);
     }
 }

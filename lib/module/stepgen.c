@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * StepGen (tag 05): points, set-up, feedback and rates. Registers: register map 3.4; points: hal-interface 2.7.
+ * StepGen (tag 05): points, set-up and feedback. Registers: register map 3.4; points: hal-interface 2.7.
  */
 #include "stepgen.h"
 
@@ -210,34 +210,6 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     }
 }
 
-static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
-{
-    struct stepgen_module *const ctx = module->context;
-    if (!ctx)
-        return;
-    if (cycle->period_ns != ctx->period_seen_ns) {
-        ctx->period_seen_ns = cycle->period_ns;
-        ctx->inverse_period = 1.0 / cycle->period_s;
-    }
-    stepgen_pack_settings(module);
-    for (unsigned i = 0; i < module->instances; i++) {
-        struct stepgen *const gen = &ctx->generator[i];
-        int32_t rate = 0;
-        /* A bite switches the outputs off but not the generators: without the pulses the position they count would be
-         * wrong (hal-interface 6, row 5a). */
-        if (*gen->enable && !cycle->bitten) {
-            gen->velocity = stepgen_velocity(gen, module, i, cycle);
-            rate = hm2_trunc_s32(gen->velocity * gen->rate_per_velocity);
-        } else {
-            gen->velocity = 0.0;
-            gen->old_cmd = hm2_finite_or(*gen->position_cmd, gen->old_cmd);
-        }
-        *gen->velocity_fb = gen->velocity;
-        *gen->dbg_step_rate = rate;
-        hm2_window_set(&ctx->rates, i, (uint32_t)rate);
-    }
-}
-
 static const struct hm2_md_variant variants[] = {
     {0, 10, 4, 0x1FF},
     {1, 10, 4, 0x1FF},
@@ -255,7 +227,7 @@ const struct hm2_module_type hm2_stepgen_type = {
     .setup = setup,
     .start = start,
     .unpack = unpack,
-    .pack = pack,
+    .pack = stepgen_pack,
     .output_name = output_name,
     .groups = groups,
 };

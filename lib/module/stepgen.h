@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What the parts of the step generator driver share: stepgen.c (points, set-up, feedback, rates), stepgen_motion.c (how
- * fast to step) and stepgen_settings.c (the rarely written registers). Private to lib/module.
+ * What the parts of the step generator driver share: stepgen.c (points, set-up, feedback), stepgen_motion.c (how fast
+ * to step) and stepgen_settings.c (the rarely written registers). Private to lib/module.
  */
 #ifndef HM2_MODULE_STEPGEN_H
 #define HM2_MODULE_STEPGEN_H
@@ -40,7 +40,7 @@ struct stepgen {
     double scale, maxvel_seen, maxaccel_seen;
     uint32_t time_seen[STEPGEN_TIMES];
     double accel, inverse_accel; /* units/s^2 and its reciprocal; 0, 0 = unlimited */
-    double limit;                /* units/s */
+    double limit, headroom;      /* units/s; and a little above */
     double rate_per_velocity;    /* rate register per unit/s */
     double velocity;             /* commanded last, units/s */
     double old_cmd;              /* position command of the previous cycle */
@@ -51,6 +51,7 @@ struct stepgen {
     uint32_t spent;     /* latches in it that have fired: to be taken out before they may be armed again */
     uint32_t table_seen[STEPGEN_TABLE_WORDS];
     uint32_t type_seen;
+    uint32_t watched;  /* not 0: the mode depends on more than step_type, look at it in every cycle */
     bool table_loaded; /* the card was given this generator's table since it was powered */
 };
 
@@ -67,18 +68,15 @@ struct stepgen_module {
     struct stepgen generator[]; /* module->instances */
 };
 
-/* ---- stepgen_motion.c: arithmetic only, realtime safe --------------------------------------------------------------
+/* ---- stepgen_motion.c: arithmetic and rates, realtime safe ----------------------------------------------------------
  */
 
 /* Take position-scale over, after making it usable. */
 void stepgen_take_scale(struct stepgen *gen, const struct hm2_module *module, unsigned number);
-/* True when position-scale, maxvel or maxaccel is not the one seen last. */
-bool stepgen_limits_changed(const struct stepgen *gen);
 /* Take position-scale, maxvel, maxaccel and the pulse times over as limits; unusable values are rewritten. */
 void stepgen_take_limits(struct stepgen *gen, const struct hm2_module *module, unsigned number);
-/* Velocity for this cycle, in units/s, finite and within the limit. */
-double stepgen_velocity(struct stepgen *gen, const struct hm2_module *module, unsigned number,
-                        const struct hm2_cycle *cycle);
+/* The cycle's rates, and what has changed. */
+void stepgen_pack(struct hm2_module *module, const struct hm2_cycle *cycle);
 
 /* ---- stepgen_settings.c --------------------------------------------------------------------------------------------
  */
@@ -89,8 +87,8 @@ int HM2_MUST_CHECK stepgen_add_settings(struct hm2_module *module, struct hm2_se
 uint32_t stepgen_clocks(uint32_t time_ns, uint32_t clock_hz);
 /* Longest pulse time in ns; also the default (hal-interface 2.7). */
 uint32_t stepgen_longest_ns(uint32_t clock_hz);
-/* Hand changed parameters to the plan. Realtime safe. */
-void stepgen_pack_settings(struct hm2_module *module);
+/* Take the parameters of a generator over and hand its registers to the plan. Realtime safe. */
+void stepgen_take_settings(struct hm2_module *module, unsigned number);
 /* The card lost its tables. */
 void stepgen_forget_tables(struct stepgen_module *ctx, unsigned instances);
 /* See whether an armed latch has fired; called with the accumulator's value of the same reply. Realtime safe. */

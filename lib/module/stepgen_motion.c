@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * How fast a step generator is to step: the velocity and position modes of hal-interface 2.7, with its verdicts (8.2).
+ * The cycle's part of it stands in one file, so that it becomes one function.
  */
 #include "stepgen.h"
 
@@ -28,13 +29,6 @@ void stepgen_take_scale(struct stepgen *const gen, const struct hm2_module *cons
     gen->scale = scale;
     /* The limits are in units of the scale: have them taken over again. */
     gen->maxvel_seen = NAN;
-}
-
-bool stepgen_limits_changed(const struct stepgen *const gen)
-{
-    /* Written so that a NaN counts as changed. */
-    return !(*gen->maxvel == gen->maxvel_seen) || !(*gen->maxaccel == gen->maxaccel_seen) ||
-           !(*gen->position_scale == gen->scale);
 }
 
 /* A limit that must be finite and not negative; 0 = none. */
@@ -67,6 +61,7 @@ void stepgen_take_limits(struct stepgen *const gen, const struct hm2_module *con
     gen->maxvel_seen = maxvel;
     gen->maxaccel_seen = accel;
     gen->limit = maxvel > 0.0 ? maxvel : fastest;
+    gen->headroom = gen->limit * HEADROOM;
     gen->accel = accel;
     gen->inverse_accel = accel > 0.0 ? 1.0 / accel : 0.0;
     gen->rate_per_velocity = gen->scale * (TWO_TO_32 / ctx->clock_hz);
@@ -125,7 +120,7 @@ static double follow(struct stepgen *const gen, const struct hm2_module *const m
     *gen->dbg_s_to_match = fabs(match_s); /* never negative: verdict of hal-interface 8.2 */
     *gen->dbg_err_at_match = error_then;
     gen->old_cmd = command;
-    if (fabs(feed_forward) > gen->limit * HEADROOM)
+    if (fabs(feed_forward) > gen->headroom)
         hm2_notice(module, HM2_NOTICE_HEADROOM, number, feed_forward);
 
     if (match_s < period_s) {
@@ -140,23 +135,67 @@ static double follow(struct stepgen *const gen, const struct hm2_module *const m
     return before + acceleration * period_s;
 }
 
-double stepgen_velocity(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number,
-                        const struct hm2_cycle *const cycle)
+static double next_velocity(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number,
+                            const double period_s)
 {
     double velocity;
     if (*gen->control_type) {
         velocity = usable_command(module, number, *gen->velocity_cmd, 0.0);
         if (gen->accel > 0.0) {
-            const double step = gen->accel * cycle->period_s;
+            const double step = gen->accel * period_s;
             velocity = clamp(velocity, gen->velocity - step, gen->velocity + step);
         }
         gen->old_cmd = hm2_finite_or(*gen->position_cmd, gen->old_cmd);
     } else {
         const double command = usable_command(module, number, *gen->position_cmd, gen->old_cmd);
-        velocity = follow(gen, module, number, command, cycle->period_s);
+        velocity = follow(gen, module, number, command, period_s);
     }
     /* Commands beyond what a double can subtract end as NaN: stand still rather than guess. */
     if (!(velocity == velocity))
         return 0.0;
     return clamp(velocity, -gen->limit, gen->limit);
+}
+
+/* Is a parameter not as it was seen last? Written so that a NaN counts as changed. */
+static bool changed(const struct stepgen *const gen)
+{
+    const uint32_t words = (*gen->time_ns[STEPGEN_DIRSETUP] ^ gen->time_seen[STEPGEN_DIRSETUP]) |
+                           (*gen->time_ns[STEPGEN_DIRHOLD] ^ gen->time_seen[STEPGEN_DIRHOLD]) |
+                           (*gen->time_ns[STEPGEN_STEPLEN] ^ gen->time_seen[STEPGEN_STEPLEN]) |
+                           (*gen->time_ns[STEPGEN_STEPSPACE] ^ gen->time_seen[STEPGEN_STEPSPACE]) |
+                           (*gen->step_type ^ gen->type_seen) | gen->watched;
+    return words != 0 || !(*gen->maxvel == gen->maxvel_seen) || !(*gen->maxaccel == gen->maxaccel_seen) ||
+           !(*gen->position_scale == gen->scale);
+}
+
+void stepgen_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
+{
+    struct stepgen_module *const ctx = module->context;
+    if (!ctx)
+        return;
+    if (cycle->period_ns != ctx->period_seen_ns) {
+        ctx->period_seen_ns = cycle->period_ns;
+        ctx->inverse_period = 1.0 / cycle->period_s;
+    }
+    hm2_timer_pack(&ctx->timer, module);
+    /* A bite switches the outputs off but not the generators: without the pulses the position they count would be
+     * wrong (hal-interface 6, row 5a). */
+    const bool may_move = !cycle->bitten;
+    const double period_s = cycle->period_s;
+    for (unsigned i = 0; i < module->instances; i++) {
+        struct stepgen *const gen = &ctx->generator[i];
+        int32_t rate = 0;
+        if (changed(gen))
+            stepgen_take_settings(module, i);
+        if (*gen->enable && may_move) {
+            gen->velocity = next_velocity(gen, module, i, period_s);
+            rate = hm2_trunc_s32(gen->velocity * gen->rate_per_velocity);
+        } else {
+            gen->velocity = 0.0;
+            gen->old_cmd = hm2_finite_or(*gen->position_cmd, gen->old_cmd);
+        }
+        *gen->velocity_fb = gen->velocity;
+        *gen->dbg_step_rate = rate;
+        hm2_window_set(&ctx->rates, i, (uint32_t)rate);
+    }
 }

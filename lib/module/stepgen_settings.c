@@ -97,14 +97,6 @@ static void take_times(const struct hm2_module *const module, const unsigned num
     }
 }
 
-static bool times_changed(const struct stepgen *const gen)
-{
-    uint32_t changed = 0;
-    for (unsigned t = 0; t < STEPGEN_TIMES; t++)
-        changed |= *gen->time_ns[t] ^ gen->time_seen[t];
-    return changed != 0;
-}
-
 static bool table_changed(const struct stepgen *const gen)
 {
     uint32_t changed = 0;
@@ -166,25 +158,21 @@ static uint32_t latch_bits(struct stepgen *const gen)
     return bits;
 }
 
-void stepgen_pack_settings(struct hm2_module *const module)
+void stepgen_take_settings(struct hm2_module *const module, const unsigned number)
 {
     struct stepgen_module *const ctx = module->context;
-    hm2_timer_pack(&ctx->timer, module);
-    for (unsigned i = 0; i < module->instances; i++) {
-        struct stepgen *const gen = &ctx->generator[i];
-        if (times_changed(gen) || stepgen_limits_changed(gen)) {
-            take_times(module, i);
-            stepgen_take_limits(gen, module, i);
-        }
-        uint32_t word = type_bits(gen, module, i);
-        if (ctx->has_swap && *gen->swap_step_dir)
-            word |= MODE_SWAP;
-        if (ctx->has_latch)
-            word |= latch_bits(gen);
-        if (word != gen->mode_word) {
-            gen->mode_word = word;
-            hm2_section_set(&gen->mode, 0, word);
-        }
+    struct stepgen *const gen = &ctx->generator[number];
+    take_times(module, number);
+    stepgen_take_limits(gen, module, number);
+    uint32_t word = type_bits(gen, module, number);
+    if (ctx->has_swap && *gen->swap_step_dir)
+        word |= MODE_SWAP;
+    if (ctx->has_latch)
+        word |= latch_bits(gen);
+    gen->watched = ctx->has_swap || (word & MODE_TABLE) == MODE_TABLE;
+    if (word != gen->mode_word) {
+        gen->mode_word = word;
+        hm2_section_set(&gen->mode, 0, word);
     }
 }
 

@@ -12,8 +12,8 @@
 
 #define INMUX_CONTROL 0x8000
 
-/* Cycles in which every input is shown at least once. */
-#define ALL_TURNS 3u
+/* Cycles in which every input is shown and every parameter looked at, for any width. */
+#define ALL_TURNS 8u
 
 static struct module_rig *started(const uint32_t control, struct hm2_module **inm)
 {
@@ -69,7 +69,7 @@ static void the_control_word_is_that_of_the_reference(void **state)
     rig_set(rig, "inm.00.scan_rate", 5000);
     rig_set(rig, "inm.00.fast_scans", 1);
     rig_set(rig, "inm.00.slow_scans", 1023);
-    rig_cycle(rig);
+    rig_cycles(rig, ALL_TURNS);
     assert_int_equal(rig_written(rig, CONTROL(0)), 1023u << 22 | 1u << 16 | 453u << 6 | 0x20);
     rig_free(rig);
 }
@@ -95,7 +95,7 @@ static void parameters_are_brought_into_their_limits_and_rewritten(void **state)
     struct module_rig *const rig = started(10, &inm);
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         rig_set(rig, rows[i].name, rows[i].wanted);
-        rig_cycles(rig, 2);
+        rig_cycles(rig, ALL_TURNS);
         if (!(rig_get(rig, rows[i].name) >= rows[i].shown && rig_get(rig, rows[i].name) <= rows[i].shown))
             fail_msg("%s = %g became %g, expected %g", rows[i].name, rows[i].wanted, rig_get(rig, rows[i].name),
                      rows[i].shown);
@@ -214,7 +214,7 @@ static void counting_modes_are_one_bit_per_byte(void **state)
                 {"inm.00.enc3_4xmode", 0x01010101}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         rig_set(rig, rows[i].name, 1);
-        rig_cycle(rig);
+        rig_cycles(rig, ALL_TURNS);
         assert_int_equal(rig_written(rig, COUNTERS(0)), rows[i].word);
     }
     rig_cycle(rig);

@@ -22,6 +22,23 @@ static struct module_rig *started(struct hm2_module **dog)
     return rig;
 }
 
+/* The same after a few cycles. */
+static struct module_rig *running(struct hm2_module **dog)
+{
+    struct module_rig *const rig = started(dog);
+    rig_cycles(rig, 3);
+    return rig;
+}
+
+/* The same, and then the dog has bitten and was seen. */
+static struct module_rig *bitten(struct hm2_module **dog)
+{
+    struct module_rig *const rig = running(dog);
+    rig_put(rig, STATUS, 1);
+    rig_cycle(rig);
+    return rig;
+}
+
 static void points_are_those_that_hal_files_know(void **state)
 {
     (void)state;
@@ -79,10 +96,7 @@ static void a_bite_is_latched_and_told_once(void **state)
 {
     (void)state;
     struct hm2_module *dog;
-    struct module_rig *const rig = started(&dog);
-    rig_cycles(rig, 3);
-    rig_put(rig, STATUS, 1);
-    rig_cycle(rig);
+    struct module_rig *const rig = bitten(&dog);
     assert_true(rig_get(rig, "watchdog.has_bit") == 1.0);
     assert_true(hm2_watchdog_bitten(dog));
     rig_put(rig, STATUS, 0); /* whatever the card says later */
@@ -97,10 +111,7 @@ static void clearing_has_bit_zeroes_the_status_and_sends_everything_again(void *
 {
     (void)state;
     struct hm2_module *dog;
-    struct module_rig *const rig = started(&dog);
-    rig_cycles(rig, 3);
-    rig_put(rig, STATUS, 1);
-    rig_cycles(rig, 2);
+    struct module_rig *const rig = bitten(&dog);
     rig_set(rig, "watchdog.has_bit", 0);
     assert_false(hm2_watchdog_bitten(dog)); /* so that the same write turns the outputs on rig */
     rig->written[STATUS / 4] = 0xFFFFFFFF;
@@ -121,10 +132,7 @@ static void a_lost_recovery_is_repeated_and_not_taken_for_another_bite(void **st
 {
     (void)state;
     struct hm2_module *dog;
-    struct module_rig *const rig = started(&dog);
-    rig_cycles(rig, 3);
-    rig_put(rig, STATUS, 1);
-    rig_cycle(rig);
+    struct module_rig *const rig = bitten(&dog);
     rig_set(rig, "watchdog.has_bit", 0);
     rig->lose_writes = true;
     rig_write_out(rig);
@@ -144,10 +152,7 @@ static void a_bite_right_after_recovery_is_a_new_one(void **state)
 {
     (void)state;
     struct hm2_module *dog;
-    struct module_rig *const rig = started(&dog);
-    rig_cycles(rig, 3);
-    rig_put(rig, STATUS, 1);
-    rig_cycle(rig);
+    struct module_rig *const rig = bitten(&dog);
     rig_set(rig, "watchdog.has_bit", 0);
     rig_write_out(rig);
     rig_read(rig); /* the zero arrived, and the dog bit rig before the read */
@@ -160,8 +165,7 @@ static void setting_has_bit_by_hand_does_nothing(void **state)
 {
     (void)state;
     struct hm2_module *dog;
-    struct module_rig *const rig = started(&dog);
-    rig_cycles(rig, 3);
+    struct module_rig *const rig = running(&dog);
     rig_set(rig, "watchdog.has_bit", 1);
     rig_cycle(rig);
     assert_false(hm2_watchdog_bitten(dog));
@@ -194,8 +198,7 @@ static void a_new_time_out_is_sent_once(void **state)
 {
     (void)state;
     struct hm2_module *dog;
-    struct module_rig *const rig = started(&dog);
-    rig_cycles(rig, 2);
+    struct module_rig *const rig = running(&dog);
     rig_set(rig, "watchdog.timeout_ns", 20000000);
     rig_cycle(rig);
     assert_true(rig_wrote(rig, TIMER));
@@ -228,8 +231,7 @@ static void a_time_out_below_one_and_a_half_periods_is_told_once_per_change(void
 {
     (void)state;
     struct hm2_module *dog;
-    struct module_rig *const rig = started(&dog);
-    rig_cycles(rig, 3);
+    struct module_rig *const rig = running(&dog);
     assert_int_equal(dog->noticed[HM2_NOTICE_TIMEOUT_SHORT], 0);
     rig_set(rig, "watchdog.timeout_ns", 1500000);
     rig_cycles(rig, 3);
@@ -247,8 +249,7 @@ static void a_card_that_lost_its_power_counts_as_bitten(void **state)
 {
     (void)state;
     struct hm2_module *dog;
-    struct module_rig *const rig = started(&dog);
-    rig_cycles(rig, 3);
+    struct module_rig *const rig = running(&dog);
     hm2_watchdog_raise(dog);
     assert_true(hm2_watchdog_bitten(dog));
     rig_cycles(rig, 3);

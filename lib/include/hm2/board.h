@@ -20,6 +20,8 @@
 #include <hm2/err.h>
 #include <hm2/idrom.h>
 #include <hm2/link.h>
+#include <hm2/module.h>
+#include <hm2/plan.h>
 #include <hm2/points.h>
 
 /* What a card's name tells (hal-interface 1.3). */
@@ -73,6 +75,12 @@ HM2_API bool hm2_board_request_outstanding(const struct hm2_board *board);
 /* What happened, for people. Not realtime; may run in another thread than the cycle. Returns 1 with one sentence in
  * text and its severity in *error (true = an operator must know), 0 when there is nothing new. */
 HM2_API int hm2_board_next_message(struct hm2_board *board, char *text, size_t size, bool *error);
+
+/* Payload bytes of the cycle's datagrams and what they hold; after setup. */
+HM2_API struct hm2_plan_sizes hm2_board_sizes(const struct hm2_board *board);
+
+/* Tables of the board's own points, for documentation; ends with a row whose points are NULL. */
+HM2_API const struct hm2_point_group *hm2_board_point_groups(void);
 
 /* Listing of pins by terminal name and owner, one line a pin, as printed at load. Returns characters needed. */
 HM2_API size_t hm2_board_describe_pins(const struct hm2_board *board, char *text, size_t size);

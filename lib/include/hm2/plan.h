@@ -19,9 +19,9 @@
  * (seed 000, "MEMORY SPACE 4 LAYOUT": 0x0010..0x001E for any use).
  *
  * The session number belongs to the set-up stream: it is sent ahead of the sections in the first write, and again
- * after hm2_plan_touch_all(), until a reply shows it. With it goes HM2Timeout = 0 (space 4, 0x0004): every write of a
- * scratch register waits for DPLL timer 4 until that time-out (recorded exchanges, tests/data/lbp16/README.md), and
- * nothing here waits inside the card.
+ * by hm2_plan_touch_all() when a card had lost it, until a reply shows it. With it goes HM2Timeout = 0 (space 4,
+ * 0x0004): every write of a scratch register waits for DPLL timer 4 until that time-out (recorded exchanges,
+ * tests/data/lbp16/README.md), and nothing here waits inside the card.
  *
  * Set-up sections are resent until the card has confirmed the write that carried them: a section may therefore arrive
  * more than once, never not at all. When the card carries an older write out after a newer one (the network changed

@@ -1,0 +1,306 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * hm2_lbp16: Mesa Ethernet cards as HAL pins and functions.
+ *
+ *     loadrt hm2_lbp16 board_ip=192.168.1.121[,...] config="num_stepgens=5 ..."[,...]
+ *
+ * HAL glue only: everything about cards is in libhm2. The module parameters are those of LinuxCNC's hostmot2 and
+ * hm2_eth together, so that a HAL file needs no change but this line.
+ */
+#include <errno.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <string.h>
+#include <time.h>
+
+#include <hal.h>
+#include <rtapi.h>
+#include <rtapi_app.h>
+
+#include <hm2/board.h>
+#include <hm2/link.h>
+
+#include "common/hal_binder.h"
+
+MODULE_AUTHOR("libhm2 developers");
+MODULE_DESCRIPTION("Mesa Electronics HostMot2 cards over Ethernet (LBP16)");
+MODULE_LICENSE("GPL");
+
+#define MAX_CARDS 16
+
+static char *board_ip[MAX_CARDS];
+RTAPI_MP_ARRAY_STRING(board_ip, MAX_CARDS, "IPv4 address of each card, optionally with :port");
+static char *config[MAX_CARDS];
+RTAPI_MP_ARRAY_STRING(config, MAX_CARDS, "configuration of each card, see hm2_lbp16(9)");
+static int debug = 0;
+RTAPI_MP_INT(debug, "1 = print the pin listing and packet sizes at load");
+static int busy_poll = 0;
+RTAPI_MP_INT(busy_poll, "SO_BUSY_POLL of the sockets in microseconds; 0 = off");
+
+/* Accepted so that load lines written for hostmot2 and hm2_eth work unchanged; hm2_lbp16(9) says what each does. */
+static char *board_rtnet[MAX_CARDS];
+RTAPI_MP_ARRAY_STRING(board_rtnet, MAX_CARDS, "accepted for compatibility; sockets are always ordinary ones");
+static char *firewall = 0;
+RTAPI_MP_STRING(firewall, "accepted for compatibility; this component never touches the firewall");
+static int debug_idrom = 0;
+RTAPI_MP_INT(debug_idrom, "print the IDROM header at load");
+static int debug_module_descriptors = 0;
+RTAPI_MP_INT(debug_module_descriptors, "print the module descriptors at load");
+static int debug_pin_descriptors = 0;
+RTAPI_MP_INT(debug_pin_descriptors, "print the pin listing at load");
+static int debug_modules = 0;
+RTAPI_MP_INT(debug_modules, "print what each module uses at load");
+static int use_serial_numbers = 0;
+RTAPI_MP_INT(use_serial_numbers, "name smart-serial remotes by unit number");
+static int sserial_baudrate = -1;
+RTAPI_MP_INT(sserial_baudrate, "force the smart-serial baud rate; -1 = as the firmware has it");
+
+struct card {
+    struct hm2_board *board;
+    unsigned cycle; /* calls of .read so far */
+    int thread;     /* the realtime thread that called it last */
+};
+
+static int component_id;
+static struct card cards[MAX_CARDS];
+static unsigned card_count;
+static struct hal_binder hal;
+
+/* ---- functions of a card ------------------------------------------------------------------------------------------
+ * A HAL file may schedule only .read for several cards. The first .read of a cycle then sends the requests of all
+ * cards that the same thread reads, so that they travel in parallel; a card that has left the thread lags behind in
+ * its count and is no longer served. */
+
+static void request_all(const struct card *const caller, const long period)
+{
+    for (unsigned i = 0; i < card_count; i++) {
+        struct card *const other = &cards[i];
+        const bool same_turn = other->thread == caller->thread && other->cycle == caller->cycle;
+        if ((other == caller || same_turn) && !hm2_board_request_outstanding(other->board))
+            hm2_board_request(other->board, period);
+    }
+}
+
+static void card_read_request(void *const arg, const long period)
+{
+    struct card *const card = arg;
+    if (!hm2_board_request_outstanding(card->board))
+        hm2_board_request(card->board, period);
+}
+
+static void card_read(void *const arg, const long period)
+{
+    struct card *const card = arg;
+    card->thread = rtapi_task_self();
+    if (!hm2_board_request_outstanding(card->board))
+        request_all(card, period);
+    hm2_board_read(card->board, period);
+    card->cycle++;
+}
+
+static void card_write(void *const arg, const long period)
+{
+    struct card *const card = arg;
+    hm2_board_write(card->board, period);
+}
+
+static const struct {
+    const char *name;
+    void (*function)(void *arg, long period);
+} functions[] = {
+    {"read-request", card_read_request},
+    {"read", card_read},
+    {"write", card_write},
+};
+
+static int export_functions(struct card *const card)
+{
+    for (size_t i = 0; i < sizeof functions / sizeof functions[0]; i++) {
+        char name[HAL_NAME_LEN + 1];
+        const char *const prefix = hm2_board_prefix(card->board);
+        const int len = rtapi_snprintf(name, sizeof name, "%s.%s", prefix, functions[i].name);
+        if (len < 0 || (size_t)len >= sizeof name) {
+            rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: function name %s.%s is longer than HAL allows (%d)\n", prefix,
+                            functions[i].name, HAL_NAME_LEN);
+            return -EINVAL;
+        }
+        const int result = hal_export_funct(name, functions[i].function, card, 1, 0, component_id);
+        if (result < 0) {
+            rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: HAL did not take the function %s (%d)\n", name, result);
+            return result;
+        }
+    }
+    return 0;
+}
+
+/* ---- messages: formatted and printed outside the realtime threads ------------------------------------------------ */
+
+#define MESSAGE_POLL_NS 100000000L
+
+static pthread_t messenger;
+static bool messenger_runs;
+static atomic_bool messenger_ends;
+
+static void print_messages(void)
+{
+    char text[1024];
+    bool error;
+    for (unsigned i = 0; i < card_count; i++)
+        for (unsigned n = 0; n < 32 && hm2_board_next_message(cards[i].board, text, sizeof text, &error) == 1; n++)
+            rtapi_print_msg(error ? RTAPI_MSG_ERR : RTAPI_MSG_WARN, "hm2_lbp16: %s\n", text);
+}
+
+static void *messenger_main(void *const unused)
+{
+    const struct timespec pause = {.tv_nsec = MESSAGE_POLL_NS};
+    (void)unused;
+    while (!atomic_load(&messenger_ends)) {
+        print_messages();
+        nanosleep(&pause, NULL);
+    }
+    return NULL;
+}
+
+static int start_messenger(void)
+{
+    atomic_store(&messenger_ends, false);
+    const int result = pthread_create(&messenger, NULL, messenger_main, NULL);
+    if (result != 0) {
+        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: no thread for messages: %s\n", strerror(result));
+        return -result;
+    }
+    messenger_runs = true;
+    return 0;
+}
+
+static void stop_messenger(void)
+{
+    if (!messenger_runs)
+        return;
+    atomic_store(&messenger_ends, true);
+    pthread_join(messenger, NULL);
+    messenger_runs = false;
+}
+
+/* ---- load and unload --------------------------------------------------------------------------------------------- */
+
+static void print_diag(const char *const address, const struct hm2_diag *const diag)
+{
+    const char *line = diag->text;
+    while (*line) {
+        const size_t len = strcspn(line, "\n");
+        const bool warning = strncmp(line, "warning: ", 9) == 0;
+        rtapi_print_msg(warning ? RTAPI_MSG_WARN : RTAPI_MSG_ERR, "hm2_lbp16: card %s: %.*s\n", address, (int)len,
+                        line);
+        line += len + (line[len] == '\n');
+    }
+}
+
+static void print_listing(const struct card *const card)
+{
+    static char text[16384];
+    const struct hm2_plan_sizes sizes = hm2_board_sizes(card->board);
+    hm2_board_describe_pins(card->board, text, sizeof text);
+    rtapi_print("%s: payload of a cycle: request %u, reply %u, write %u bytes; set-up up to %u bytes in %u sections\n",
+                hm2_board_prefix(card->board), (unsigned)sizes.request_bytes, (unsigned)sizes.reply_bytes,
+                (unsigned)sizes.write_bytes, (unsigned)sizes.setup_bytes, sizes.sections);
+    for (const char *line = text; *line;) {
+        const size_t len = strcspn(line, "\n");
+        rtapi_print("%.*s\n", (int)len, line);
+        line += len + (line[len] == '\n');
+    }
+}
+
+static unsigned cards_of_same_name(const struct card *const card)
+{
+    unsigned count = 0;
+    for (const struct card *other = cards; other < card; other++)
+        count += hm2_board_type(other->board) == hm2_board_type(card->board);
+    return count;
+}
+
+static int bring_up(struct card *const card, const char *const address, const char *const configuration,
+                    struct hm2_diag *const diag)
+{
+    const struct link_udp_options options = {
+        .address = address, .busy_poll_us = busy_poll > 0 ? (unsigned)busy_poll : 0, .watch_strangers = true};
+    struct link *link;
+    int err = link_udp_open(&link, &options, diag);
+    if (err == HM2_OK)
+        err = hm2_board_identify(card->board, link, diag);
+    if (err == HM2_OK)
+        err = hm2_board_setup(card->board, cards_of_same_name(card), &hal.binder, configuration, diag);
+    if (err == HM2_OK)
+        err = hm2_board_start(card->board, diag);
+    return err;
+}
+
+static int load_card(const char *const address, const char *const configuration)
+{
+    struct card *const card = &cards[card_count];
+    struct hm2_diag diag;
+
+    hm2_diag_clear(&diag);
+    card->board = hm2_board_new();
+    if (!card->board)
+        return -ENOMEM;
+    card_count++;
+    const int err = bring_up(card, address, configuration, &diag);
+    print_diag(address, &diag);
+    if (err != HM2_OK) {
+        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: not loaded: %s\n", address, hm2_strerror(err));
+        return -EINVAL;
+    }
+    if (debug || debug_pin_descriptors || debug_modules || debug_idrom || debug_module_descriptors)
+        print_listing(card);
+    return export_functions(card);
+}
+
+static int load_cards(void)
+{
+    if (!board_ip[0] || !board_ip[0][0]) {
+        rtapi_print_msg(RTAPI_MSG_ERR,
+                        "hm2_lbp16: no card given; load with: loadrt hm2_lbp16 board_ip=192.168.1.121\n");
+        return -EINVAL;
+    }
+    for (unsigned i = 0; i < MAX_CARDS && board_ip[i] && board_ip[i][0]; i++) {
+        const int result = load_card(board_ip[i], config[i]);
+        if (result < 0)
+            return result;
+    }
+    return 0;
+}
+
+/* Outputs go to their safe state before the memory that HAL's functions use goes away. */
+static void unload_cards(void)
+{
+    for (unsigned i = 0; i < card_count; i++)
+        hm2_board_stop(cards[i].board);
+    stop_messenger();
+    print_messages();
+    hal_exit(component_id);
+    for (unsigned i = 0; i < card_count; i++)
+        hm2_board_free(cards[i].board);
+    card_count = 0;
+}
+
+int rtapi_app_main(void)
+{
+    component_id = hal_init("hm2_lbp16");
+    if (component_id < 0)
+        return component_id;
+    hal_binder_init(&hal, component_id);
+    int result = load_cards();
+    if (result == 0)
+        result = start_messenger();
+    if (result == 0)
+        result = hal_ready(component_id);
+    if (result < 0)
+        unload_cards();
+    return result;
+}
+
+void rtapi_app_exit(void)
+{
+    unload_cards();
+}

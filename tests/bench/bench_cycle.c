@@ -1,0 +1,400 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * One servo cycle of a driver, measured from inside: wall time of read and write, or the user instructions they take.
+ *
+ *     bench_cycle time  DRIVER PREFIX CYCLES FOLDER [component arguments...]
+ *     bench_cycle count DRIVER PREFIX CYCLES FOLDER [component arguments...]
+ *     bench_cycle echo  ADDRESS PORT REQUEST_BYTES REPLY_BYTES WRITE_BYTES CYCLES
+ *     bench_cycle serve ADDRESS PORT REQUEST_BYTES REPLY_BYTES
+ *
+ * DRIVER is hm2_lbp16, or hm2_eth (LinuxCNC's, with hostmot2 before it). The component is loaded into the small HAL
+ * host in this process; a 1 kHz thread calls PREFIX.read and PREFIX.write with marks of our own around them.
+ * Instructions are counted by single-stepping that thread from another process: exact, repeatable, and without the
+ * kernel's share. `echo` exchanges packets of the same sizes with `serve`, with nothing but the system calls.
+ */
+#include <arpa/inet.h>
+#include <errno.h>
+#include <poll.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/ptrace.h>
+#include <sys/socket.h>
+#include <sys/user.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "halhost.h"
+#include "state.h"
+
+#define PERIOD_NS  1000000L
+#define WARM_UP    300
+#define CLIENT_CPU 1
+#define SERVER_CPU 0
+
+static int64_t now_ns(void)
+{
+    struct timespec ts;
+    clock_gettime(CLOCK_MONOTONIC, &ts);
+    return (int64_t)ts.tv_sec * 1000000000 + ts.tv_nsec;
+}
+
+static void sleep_until(const int64_t when_ns)
+{
+    const struct timespec ts = {.tv_sec = when_ns / 1000000000, .tv_nsec = when_ns % 1000000000};
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &ts, NULL);
+}
+
+/* As a servo thread would run; measurements on a machine that does not permit it are still ratios. */
+static void take_processor(const int cpu)
+{
+    const struct sched_param fifo = {.sched_priority = 50};
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET((size_t)cpu, &set);
+    (void)sched_setaffinity(0, sizeof set, &set);
+    (void)sched_setscheduler(0, SCHED_FIFO, &fifo);
+    (void)mlockall(MCL_CURRENT | MCL_FUTURE);
+}
+
+/* ---- results ----------------------------------------------------------------------------------------------------- */
+
+static int compare(const void *const a, const void *const b)
+{
+    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void print_times(const char *const name, int64_t *const ns, const int count)
+{
+    qsort(ns, (size_t)count, sizeof *ns, compare);
+    printf("%s_median_ns=%lld\n%s_p99_ns=%lld\n", name, (long long)ns[count / 2], name,
+           (long long)ns[(int)(count * 0.99)]);
+}
+
+static void print_cycle_times(int64_t *const read_ns, int64_t *const write_ns, const int cycles)
+{
+    int64_t *const both = malloc((size_t)cycles * sizeof *both);
+    if (!both)
+        exit(1);
+    for (int i = 0; i < cycles; i++)
+        both[i] = read_ns[i] + write_ns[i];
+    print_times("cycle", both, cycles);
+    print_times("read", read_ns, cycles);
+    print_times("write", write_ns, cycles);
+    free(both);
+}
+
+/* ---- the driver under test --------------------------------------------------------------------------------------- */
+
+static void print_message(void *const context, const enum halhost_stream stream, const char *const text)
+{
+    (void)context;
+    (void)stream;
+    fputs(text, stderr);
+}
+
+static void load(const char *const name, char **const arguments, const int count)
+{
+    struct hm2_diag diag = {0};
+    const char *list[16];
+    for (int i = 0; i < count && i < 16; i++)
+        list[i] = arguments[i];
+    if (halhost_load(name, list, (size_t)count, &diag) != 0) {
+        fprintf(stderr, "bench_cycle: %s", diag.text);
+        exit(1);
+    }
+}
+
+/* ---- marks: functions of our own around the driver's in the thread ----------------------------------------------- */
+
+struct shared {
+    _Atomic int thread; /* kernel's number of the realtime thread */
+    _Atomic int cycle;  /* complete ones */
+};
+
+static struct shared *shared;
+static int64_t mark_ns[3];
+static int64_t *read_times, *write_times;
+static int wanted_cycles, seen_cycles;
+
+__attribute__((noinline)) static void mark_begin(void *const arg, const long period)
+{
+    (void)arg;
+    (void)period;
+    shared->thread = (int)gettid();
+    mark_ns[0] = now_ns();
+}
+
+__attribute__((noinline)) static void mark_middle(void *const arg, const long period)
+{
+    (void)arg;
+    (void)period;
+    mark_ns[1] = now_ns();
+}
+
+__attribute__((noinline)) static void mark_end(void *const arg, const long period)
+{
+    (void)arg;
+    (void)period;
+    mark_ns[2] = now_ns();
+    const int at = seen_cycles++ - WARM_UP;
+    if (at >= 0 && at < wanted_cycles) {
+        read_times[at] = mark_ns[1] - mark_ns[0];
+        write_times[at] = mark_ns[2] - mark_ns[1];
+    }
+    shared->cycle++;
+}
+
+static int marks_id;
+
+static int marks_main(void *const block)
+{
+    (void)block;
+    marks_id = hal_init("marks");
+    if (marks_id < 0)
+        return marks_id;
+    hal_export_funct("mark.begin", mark_begin, NULL, 1, 0, marks_id);
+    hal_export_funct("mark.middle", mark_middle, NULL, 1, 0, marks_id);
+    hal_export_funct("mark.end", mark_end, NULL, 1, 0, marks_id);
+    return hal_ready(marks_id);
+}
+
+static void marks_exit(void *const block)
+{
+    (void)block;
+    hal_exit(marks_id);
+}
+
+static const struct halhost_builtin marks = {.name = "marks", .main = marks_main, .exit = marks_exit};
+
+static void add(const char *const prefix, const char *const suffix)
+{
+    char name[64];
+    snprintf(name, sizeof name, "%s%s", prefix, suffix);
+    if (hal_add_funct_to_thread(name, "servo", -1) != 0) {
+        fprintf(stderr, "bench_cycle: no function %s\n", name);
+        exit(1);
+    }
+}
+
+static void start_driver(const char *const name, const char *const prefix, const char *const folder,
+                         char **const arguments, const int count)
+{
+    static const char *folders[3];
+    char name_argument[] = "name1=servo", period_argument[] = "period1=1000000";
+    char *thread_arguments[] = {name_argument, period_argument};
+    struct hm2_diag diag = {0};
+    folders[0] = folder;
+    folders[1] = "/usr/lib/linuxcnc/modules";
+    const struct halhost_options options = {
+        .message = print_message, .folders = folders, .builtins = &marks, .builtin_count = 1, .cpu = CLIENT_CPU};
+    if (halhost_open(&options, &diag) != 0) {
+        fprintf(stderr, "bench_cycle: %s", diag.text);
+        exit(1);
+    }
+    load("threads", thread_arguments, 2);
+    load("marks", NULL, 0);
+    if (strcmp(name, "hm2_eth") == 0)
+        load("hostmot2", NULL, 0);
+    load(name, arguments, count);
+    add("mark", ".begin");
+    add(prefix, ".read");
+    add("mark", ".middle");
+    add(prefix, ".write");
+    add("mark", ".end");
+    if (halhost_start(&diag) != 0) {
+        fprintf(stderr, "bench_cycle: %s", diag.text);
+        exit(1);
+    }
+}
+
+static void wait_for_cycles(const int cycles)
+{
+    while (shared->cycle < cycles)
+        usleep(1000);
+}
+
+static void stop_driver(void)
+{
+    struct hm2_diag diag = {0};
+    (void)halhost_close(&diag);
+}
+
+static int measure_time(const int cycles, char **const argv, const int count)
+{
+    wanted_cycles = cycles;
+    read_times = calloc((size_t)cycles, sizeof *read_times);
+    write_times = calloc((size_t)cycles, sizeof *write_times);
+    if (!read_times || !write_times)
+        return 1;
+    start_driver(argv[0], argv[1], argv[3], argv + 4, count - 4);
+    wait_for_cycles(cycles + WARM_UP);
+    stop_driver();
+    print_cycle_times(read_times, write_times, cycles);
+    return 0;
+}
+
+/* ---- instructions ------------------------------------------------------------------------------------------------ */
+
+struct counts {
+    long long read, write;
+    int cycles;
+};
+
+/* Step the stopped thread through whole cycles; where it is tells what the instruction belongs to. */
+static int step_cycles(const pid_t thread, const int cycles, struct counts *const counts)
+{
+    const unsigned long begin = (unsigned long)mark_begin, middle = (unsigned long)mark_middle,
+                        end = (unsigned long)mark_end;
+    enum { OUTSIDE, IN_BEGIN, IN_READ, IN_MIDDLE, IN_WRITE } where = OUTSIDE;
+    struct user_regs_struct regs;
+    unsigned long mark_stack = 0;
+    int status;
+
+    while (counts->cycles < cycles) {
+        if (ptrace(PTRACE_SINGLESTEP, thread, NULL, NULL) != 0 || waitpid(thread, &status, __WALL) != thread)
+            return -1;
+        if (!WIFSTOPPED(status) || ptrace(PTRACE_GETREGS, thread, NULL, &regs) != 0)
+            return -1;
+        if (regs.rip == begin || regs.rip == middle) {
+            where = regs.rip == begin ? IN_BEGIN : IN_MIDDLE;
+            mark_stack = regs.rsp;
+        } else if (regs.rip == end) {
+            counts->cycles += where == IN_WRITE;
+            where = OUTSIDE;
+        } else if ((where == IN_BEGIN || where == IN_MIDDLE) && regs.rsp > mark_stack) {
+            /* The mark has returned; the host's few instructions up to the next call are counted with the function. */
+            where = where == IN_BEGIN ? IN_READ : IN_WRITE;
+        } else if (where == IN_READ) {
+            counts->read++;
+        } else if (where == IN_WRITE) {
+            counts->write++;
+        }
+    }
+    return 0;
+}
+
+static int attach(const pid_t thread)
+{
+    int status;
+    if (ptrace(PTRACE_SEIZE, thread, NULL, NULL) != 0 || ptrace(PTRACE_INTERRUPT, thread, NULL, NULL) != 0)
+        return -1;
+    return waitpid(thread, &status, __WALL) == thread ? 0 : -1;
+}
+
+static int measure_instructions(const int cycles, char **const argv, const int count)
+{
+    struct counts counts = {0};
+    const pid_t child = fork();
+    if (child == 0) {
+        wanted_cycles = 0;
+        start_driver(argv[0], argv[1], argv[3], argv + 4, count - 4);
+        for (;;)
+            pause();
+    }
+    while (shared->cycle < WARM_UP && waitpid(child, NULL, WNOHANG) == 0)
+        usleep(1000);
+    const int failed = attach(shared->thread) != 0 || step_cycles(shared->thread, cycles, &counts) != 0;
+    if (failed)
+        perror("bench_cycle: single-stepping");
+    kill(child, SIGKILL);
+    if (failed)
+        return 1;
+    printf("read_instructions=%lld\nwrite_instructions=%lld\ncycle_instructions=%lld\n", counts.read / cycles,
+           counts.write / cycles, (counts.read + counts.write) / cycles);
+    return 0;
+}
+
+/* ---- bare echo --------------------------------------------------------------------------------------------------- */
+
+static struct sockaddr_in address_of(const char *const address, const char *const port)
+{
+    struct sockaddr_in in = {.sin_family = AF_INET, .sin_port = htons((uint16_t)strtoul(port, NULL, 10))};
+    if (inet_pton(AF_INET, address, &in.sin_addr) != 1) {
+        fprintf(stderr, "bench_cycle: %s is no IPv4 address\n", address);
+        exit(2);
+    }
+    return in;
+}
+
+static int serve(char **const argv)
+{
+    const struct sockaddr_in self = address_of(argv[0], argv[1]);
+    const ssize_t request = (ssize_t)strtoul(argv[2], NULL, 10), reply = (ssize_t)strtoul(argv[3], NULL, 10);
+    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+    char buffer[2048] = {0};
+    take_processor(SERVER_CPU);
+    if (fd < 0 || bind(fd, (const struct sockaddr *)&self, sizeof self) != 0 || reply > (ssize_t)sizeof buffer) {
+        perror("bench_cycle: serve");
+        return 1;
+    }
+    for (;;) {
+        struct sockaddr_in from;
+        socklen_t len = sizeof from;
+        if (recvfrom(fd, buffer, sizeof buffer, 0, (struct sockaddr *)&from, &len) == request)
+            (void)sendto(fd, buffer, (size_t)reply, 0, (struct sockaddr *)&from, len);
+    }
+}
+
+static int64_t exchange(const int fd, const char *const data, const size_t request, const size_t reply)
+{
+    char buffer[2048];
+    struct pollfd ready = {.fd = fd, .events = POLLIN};
+    const struct timespec limit = {.tv_nsec = 100000000};
+    const int64_t start = now_ns();
+    if (send(fd, data, request, 0) < 0 || ppoll(&ready, 1, &limit, NULL) != 1 ||
+        recv(fd, buffer, sizeof buffer, MSG_DONTWAIT) != (ssize_t)reply)
+        fprintf(stderr, "bench_cycle: an echo was lost\n");
+    return now_ns() - start;
+}
+
+static int echo(char **const argv)
+{
+    const struct sockaddr_in peer = address_of(argv[0], argv[1]);
+    const size_t request = strtoul(argv[2], NULL, 10), reply = strtoul(argv[3], NULL, 10),
+                 write_bytes = strtoul(argv[4], NULL, 10);
+    const int cycles = (int)strtoul(argv[5], NULL, 10);
+    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+    static const char data[2048];
+    int64_t *const reads = calloc((size_t)cycles, sizeof *reads), *const writes =
+                                                                      calloc((size_t)cycles, sizeof *writes);
+    if (!reads || !writes || fd < 0 || connect(fd, (const struct sockaddr *)&peer, sizeof peer) != 0)
+        return 1;
+    take_processor(CLIENT_CPU);
+    int64_t next = now_ns();
+    for (int i = -WARM_UP; i < cycles; i++) {
+        sleep_until(next += PERIOD_NS);
+        const int64_t read_ns = exchange(fd, data, request, reply);
+        const int64_t start = now_ns();
+        if (send(fd, data, write_bytes, 0) < 0)
+            return 1;
+        if (i >= 0) {
+            reads[i] = read_ns;
+            writes[i] = now_ns() - start;
+        }
+    }
+    print_cycle_times(reads, writes, cycles);
+    return 0;
+}
+
+int main(const int argc, char **const argv)
+{
+    shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (shared == MAP_FAILED)
+        return 1;
+    if (argc >= 6 && strcmp(argv[1], "time") == 0)
+        return measure_time((int)strtol(argv[4], NULL, 10), argv + 2, argc - 2);
+    if (argc >= 6 && strcmp(argv[1], "count") == 0)
+        return measure_instructions((int)strtol(argv[4], NULL, 10), argv + 2, argc - 2);
+    if (argc == 8 && strcmp(argv[1], "echo") == 0)
+        return echo(argv + 2);
+    if (argc == 6 && strcmp(argv[1], "serve") == 0)
+        return serve(argv + 2);
+    fprintf(stderr, "bench_cycle: see the comment at the top of bench_cycle.c, or run `make bench`\n");
+    return 2;
+}
