@@ -14,12 +14,12 @@
 
 #define MAX_EDGES      (1u << 20)
 #define MAX_LISTED     8u
-#define WINDOW_HCLK    (6ll * 65536)
-#define MAX_HCLK       (1ll << 28)
+#define WINDOW_HCLK    (6 * 65536)
+#define MAX_HCLK       (1 << 28)
 #define CONSTANT_HCLK  16384 /* a level that lasts so long is called constant */
 #define FIRST_CLK      12    /* registers are written every third clock from here on, as in events.csv */
-#define ACCUMULATOR    65536ll
-#define PDM_CYCLE      4096ll
+#define ACCUMULATOR    65536
+#define PDM_CYCLE      4096
 #define MEASURE_OUTPUT 2u
 
 struct edge {
@@ -82,7 +82,7 @@ struct registers {
 /* ClockHigh cycles that a period can last at most. */
 static int64_t longest_period(const struct registers *const r)
 {
-    const int64_t counts = 1ll << (9 + (r->mode & 3u) + (r->mode >> 2 & 1u));
+    const int64_t counts = (int64_t)1 << (9 + (r->mode & 3u) + (r->mode >> 2 & 1u));
     const int64_t pwm = r->pwmrate ? counts * ACCUMULATOR / (int64_t)r->pwmrate : 0;
     const int64_t pdm = r->pdmrate ? PDM_CYCLE * ACCUMULATOR / (int64_t)r->pdmrate : 0;
     const int64_t longest = (r->mode >> 3 & 3u) == 3 ? pdm : pwm;
