@@ -116,6 +116,8 @@ static int bind_generator(const struct hm2_module *const module, const struct hm
         return err;
     for (unsigned t = 0; t < STEPGEN_TIMES; t++)
         *gen->time_ns[t] = stepgen_longest_ns(module->md->clock_hz);
+    gen->module = module;
+    gen->number = number;
     /* Nothing equals a NaN: the first cycle takes the parameters over. */
     gen->maxvel_seen = NAN;
     gen->scale = 1.0;
@@ -192,16 +194,16 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     struct stepgen_module *const ctx = module->context;
     if (!ctx)
         return;
-    for (unsigned i = 0; i < module->instances; i++) {
-        struct stepgen *const gen = &ctx->generator[i];
+    const uint8_t *const accumulators = ctx->accumulators.bytes;
+    for (struct stepgen *gen = ctx->generator, *const end = gen + module->instances; gen < end; gen++) {
         if (!(*gen->position_scale == gen->scale))
-            stepgen_take_scale(gen, module, i);
-        const uint32_t accumulator = hm2_window_get(&ctx->accumulators, i);
+            stepgen_take_scale(gen);
+        const uint32_t accumulator = hm2_get_le32(accumulators + 4u * gen->number);
         const int64_t moved = hm2_delta32(accumulator, gen->accumulator);
         gen->subcounts = (int64_t)((uint64_t)gen->subcounts + (uint64_t)moved);
         gen->accumulator = accumulator;
         if (ctx->has_latch)
-            stepgen_unpack_latch(gen, hm2_window_get(&ctx->latches, i));
+            stepgen_unpack_latch(gen, hm2_window_get(&ctx->latches, gen->number));
         if (*gen->position_reset)
             gen->subcounts = 0;
         gen->position = (double)gen->subcounts * (1.0 / SUBCOUNTS_PER_STEP) / gen->scale;

@@ -31,6 +31,9 @@ struct stepgen {
     hm2_float_t *position_latch; /* this and the next: version 0xC2, else NULL */
     hm2_bit_t *index_enable, *probe_enable, *index_invert, *probe_invert;
 
+    const struct hm2_module *module;
+    unsigned number; /* of this generator */
+
     /* feedback */
     uint32_t accumulator; /* as read last */
     int64_t subcounts;    /* 1/65536 step */
@@ -72,9 +75,9 @@ struct stepgen_module {
  */
 
 /* Take position-scale over, after making it usable. */
-void stepgen_take_scale(struct stepgen *gen, const struct hm2_module *module, unsigned number);
+void stepgen_take_scale(struct stepgen *gen);
 /* Take position-scale, maxvel, maxaccel and the pulse times over as limits; unusable values are rewritten. */
-void stepgen_take_limits(struct stepgen *gen, const struct hm2_module *module, unsigned number);
+void stepgen_take_limits(struct stepgen *gen);
 /* The cycle's rates, and what has changed. */
 void stepgen_pack(struct hm2_module *module, const struct hm2_cycle *cycle);
 
@@ -88,7 +91,7 @@ uint32_t stepgen_clocks(uint32_t time_ns, uint32_t clock_hz);
 /* Longest pulse time in ns; also the default (hal-interface 2.7). */
 uint32_t stepgen_longest_ns(uint32_t clock_hz);
 /* Take the parameters of a generator over and hand its registers to the plan. Realtime safe. */
-void stepgen_take_settings(struct hm2_module *module, unsigned number);
+void stepgen_take_settings(struct stepgen *gen);
 /* The card lost its tables. */
 void stepgen_forget_tables(struct stepgen_module *ctx, unsigned instances);
 /* See whether an armed latch has fired; called with the accumulator's value of the same reply. Realtime safe. */

@@ -11,20 +11,20 @@
 #define TWO_TO_32      4294967296.0
 #define HEADROOM       1.001 /* a command this much faster than the limit is told to a person */
 
-static double report(const struct hm2_module *const module, const enum hm2_notice notice, const unsigned number,
-                     const double found, const double used)
+static double report(const struct stepgen *const gen, const enum hm2_notice notice, const double found,
+                     const double used)
 {
-    hm2_notice(module, notice, number, found);
+    hm2_notice(gen->module, notice, gen->number, found);
     return used;
 }
 
-void stepgen_take_scale(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number)
+void stepgen_take_scale(struct stepgen *const gen)
 {
     double scale = *gen->position_scale;
     if (!isfinite(scale))
-        scale = report(module, HM2_NOTICE_VALUE_INVALID, number, scale, 1.0);
+        scale = report(gen, HM2_NOTICE_VALUE_INVALID, scale, 1.0);
     else if (fabs(scale) < SMALLEST_SCALE)
-        scale = report(module, HM2_NOTICE_VALUE_CLAMPED, number, scale, signbit(scale) ? -1.0 : 1.0);
+        scale = report(gen, HM2_NOTICE_VALUE_CLAMPED, scale, signbit(scale) ? -1.0 : 1.0);
     *gen->position_scale = scale;
     gen->scale = scale;
     /* The limits are in units of the scale: have them taken over again. */
@@ -32,29 +32,28 @@ void stepgen_take_scale(struct stepgen *const gen, const struct hm2_module *cons
 }
 
 /* A limit that must be finite and not negative; 0 = none. */
-static double usable_limit(const struct hm2_module *const module, const unsigned number, const double value,
-                           const double fallback)
+static double usable_limit(const struct stepgen *const gen, const double value, const double fallback)
 {
     if (!isfinite(value))
-        return report(module, HM2_NOTICE_VALUE_INVALID, number, value, fallback);
-    return value < 0.0 ? report(module, HM2_NOTICE_VALUE_CLAMPED, number, value, -value) : value;
+        return report(gen, HM2_NOTICE_VALUE_INVALID, value, fallback);
+    return value < 0.0 ? report(gen, HM2_NOTICE_VALUE_CLAMPED, value, -value) : value;
 }
 
-void stepgen_take_limits(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number)
+void stepgen_take_limits(struct stepgen *const gen)
 {
-    const struct stepgen_module *const ctx = module->context;
+    const struct stepgen_module *const ctx = gen->module->context;
     if (!(*gen->position_scale == gen->scale))
-        stepgen_take_scale(gen, module, number);
+        stepgen_take_scale(gen);
 
     const uint32_t len_ns = *gen->time_ns[STEPGEN_STEPLEN], space_ns = *gen->time_ns[STEPGEN_STEPSPACE];
     const double pulse_ns = (double)len_ns + (double)space_ns;
     const double step_hz = pulse_ns > 0.0 ? fmin(1e9 / pulse_ns, ctx->max_step_hz) : ctx->max_step_hz;
     const double fastest = step_hz / fabs(gen->scale);
-    double maxvel = usable_limit(module, number, *gen->maxvel, 0.0);
+    double maxvel = usable_limit(gen, *gen->maxvel, 0.0);
     if (maxvel > fastest)
-        maxvel = report(module, HM2_NOTICE_VALUE_CLAMPED, number, maxvel, fastest);
+        maxvel = report(gen, HM2_NOTICE_VALUE_CLAMPED, maxvel, fastest);
     /* Not a number is no reason to accelerate without limit: the default is the safe side. */
-    const double accel = usable_limit(module, number, *gen->maxaccel, 1.0);
+    const double accel = usable_limit(gen, *gen->maxaccel, 1.0);
 
     *gen->maxvel = maxvel;
     *gen->maxaccel = accel;
@@ -73,13 +72,11 @@ static double clamp(const double value, const double low, const double high)
 }
 
 /* A command pin as a number, or what to use instead of NaN and infinities. */
-static double usable_command(const struct hm2_module *const module, const unsigned number, const double command,
-                             const double fallback)
+static double usable_command(const struct stepgen *const gen, const double command, const double fallback)
 {
-    const double usable = hm2_finite_or(command, fallback);
-    if (usable == command)
-        return usable;
-    return report(module, HM2_NOTICE_VALUE_INVALID, number, command, usable);
+    if (command - command == 0.0)
+        return command;
+    return report(gen, HM2_NOTICE_VALUE_INVALID, command, fallback);
 }
 
 /* Acceleration that brings the velocity to the command's, and the time it needs. Without a limit the original
@@ -100,11 +97,8 @@ static double acceleration_to_match(const struct stepgen *const gen, const doubl
     return acceleration;
 }
 
-static double follow(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number,
-                     const double command, const double period_s)
+static double follow(struct stepgen *const gen, const double command, const double period_s, const double per_second)
 {
-    const struct stepgen_module *const ctx = module->context;
-    const double per_second = ctx->inverse_period;
     const double before = gen->velocity;
     const double feed_forward = (command - gen->old_cmd) * per_second;
     const double velocity_error = before - feed_forward;
@@ -121,7 +115,7 @@ static double follow(struct stepgen *const gen, const struct hm2_module *const m
     *gen->dbg_err_at_match = error_then;
     gen->old_cmd = command;
     if (fabs(feed_forward) > gen->headroom)
-        hm2_notice(module, HM2_NOTICE_HEADROOM, number, feed_forward);
+        hm2_notice(gen->module, HM2_NOTICE_HEADROOM, gen->number, feed_forward);
 
     if (match_s < period_s) {
         const double velocity = feed_forward - 0.5 * error_then * per_second;
@@ -135,25 +129,24 @@ static double follow(struct stepgen *const gen, const struct hm2_module *const m
     return before + acceleration * period_s;
 }
 
-static double next_velocity(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number,
-                            const double period_s)
+static double next_velocity(struct stepgen *const gen, const double period_s, const double per_second)
 {
     double velocity;
     if (*gen->control_type) {
-        velocity = usable_command(module, number, *gen->velocity_cmd, 0.0);
+        velocity = usable_command(gen, *gen->velocity_cmd, 0.0);
         if (gen->accel > 0.0) {
             const double step = gen->accel * period_s;
             velocity = clamp(velocity, gen->velocity - step, gen->velocity + step);
         }
         gen->old_cmd = hm2_finite_or(*gen->position_cmd, gen->old_cmd);
     } else {
-        const double command = usable_command(module, number, *gen->position_cmd, gen->old_cmd);
-        velocity = follow(gen, module, number, command, period_s);
+        const double command = usable_command(gen, *gen->position_cmd, gen->old_cmd);
+        velocity = follow(gen, command, period_s, per_second);
     }
+    if (fabs(velocity) <= gen->limit)
+        return velocity;
     /* Commands beyond what a double can subtract end as NaN: stand still rather than guess. */
-    if (!(velocity == velocity))
-        return 0.0;
-    return clamp(velocity, -gen->limit, gen->limit);
+    return velocity > 0.0 ? gen->limit : velocity < 0.0 ? -gen->limit : 0.0;
 }
 
 /* Is a parameter not as it was seen last? Written so that a NaN counts as changed. */
@@ -181,14 +174,14 @@ void stepgen_pack(struct hm2_module *const module, const struct hm2_cycle *const
     /* A bite switches the outputs off but not the generators: without the pulses the position they count would be
      * wrong (hal-interface 6, row 5a). */
     const bool may_move = !cycle->bitten;
-    const double period_s = cycle->period_s;
-    for (unsigned i = 0; i < module->instances; i++) {
-        struct stepgen *const gen = &ctx->generator[i];
+    const double period_s = cycle->period_s, per_second = ctx->inverse_period;
+    uint8_t *const rates = ctx->rates.bytes;
+    for (struct stepgen *gen = ctx->generator, *const end = gen + module->instances; gen < end; gen++) {
         int32_t rate = 0;
         if (changed(gen))
-            stepgen_take_settings(module, i);
+            stepgen_take_settings(gen);
         if (*gen->enable && may_move) {
-            gen->velocity = next_velocity(gen, module, i, period_s);
+            gen->velocity = next_velocity(gen, period_s, per_second);
             rate = hm2_trunc_s32(gen->velocity * gen->rate_per_velocity);
         } else {
             gen->velocity = 0.0;
@@ -196,6 +189,6 @@ void stepgen_pack(struct hm2_module *const module, const struct hm2_cycle *const
         }
         *gen->velocity_fb = gen->velocity;
         *gen->dbg_step_rate = rate;
-        hm2_window_set(&ctx->rates, i, (uint32_t)rate);
+        hm2_put_le32(rates + 4u * gen->number, (uint32_t)rate);
     }
 }

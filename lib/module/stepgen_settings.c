@@ -78,22 +78,21 @@ int stepgen_add_settings(struct hm2_module *const module, struct hm2_setup *cons
     return err;
 }
 
-static void take_times(const struct hm2_module *const module, const unsigned number)
+static void take_times(struct stepgen *const gen, struct stepgen_module *const ctx)
 {
-    struct stepgen_module *const ctx = module->context;
-    struct stepgen *const gen = &ctx->generator[number];
+    const struct hm2_module *const module = gen->module;
     const uint32_t longest_ns = stepgen_longest_ns(module->md->clock_hz);
     for (unsigned t = 0; t < STEPGEN_TIMES; t++) {
         uint32_t time_ns = *gen->time_ns[t];
         uint32_t clocks = stepgen_clocks(time_ns, module->md->clock_hz);
         if (clocks == TIME_MAX && time_ns > longest_ns) {
-            hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, number, time_ns);
+            hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, gen->number, time_ns);
             *gen->time_ns[t] = time_ns = longest_ns;
         }
         if (t == STEPGEN_STEPLEN && clocks < STEPLEN_MIN)
             clocks = STEPLEN_MIN;
         gen->time_seen[t] = time_ns;
-        hm2_section_set(&ctx->times[t], number, clocks);
+        hm2_section_set(&ctx->times[t], gen->number, clocks);
     }
 }
 
@@ -121,11 +120,11 @@ static void load_table(struct stepgen *const gen, const uint32_t entries)
 }
 
 /* Step type as bits 1:0 of the mode; 3 to 16 is a table of that many entries. */
-static uint32_t type_bits(struct stepgen *const gen, const struct hm2_module *const module, const unsigned number)
+static uint32_t type_bits(struct stepgen *const gen)
 {
     uint32_t type = *gen->step_type;
     if (type > STEPGEN_TABLE_ENTRIES) {
-        hm2_notice(module, HM2_NOTICE_TABLE_TOO_LONG, number, type);
+        hm2_notice(gen->module, HM2_NOTICE_TABLE_TOO_LONG, gen->number, type);
         *gen->step_type = type = 0;
     }
     if (type < MODE_TABLE) {
@@ -158,13 +157,12 @@ static uint32_t latch_bits(struct stepgen *const gen)
     return bits;
 }
 
-void stepgen_take_settings(struct hm2_module *const module, const unsigned number)
+void stepgen_take_settings(struct stepgen *const gen)
 {
-    struct stepgen_module *const ctx = module->context;
-    struct stepgen *const gen = &ctx->generator[number];
-    take_times(module, number);
-    stepgen_take_limits(gen, module, number);
-    uint32_t word = type_bits(gen, module, number);
+    struct stepgen_module *const ctx = gen->module->context;
+    take_times(gen, ctx);
+    stepgen_take_limits(gen);
+    uint32_t word = type_bits(gen);
     if (ctx->has_swap && *gen->swap_step_dir)
         word |= MODE_SWAP;
     if (ctx->has_latch)
