@@ -211,11 +211,13 @@ static void print_listing(const struct card *const card)
     }
 }
 
+/* Cards are numbered by the name in their prefix, which different types may share (7I80DB and 7I80HD). */
 static unsigned cards_of_same_name(const struct card *const card)
 {
+    const char *const stem = hm2_board_type(card->board)->stem;
     unsigned count = 0;
     for (const struct card *other = cards; other < card; other++)
-        count += hm2_board_type(other->board) == hm2_board_type(card->board);
+        count += strcmp(hm2_board_type(other->board)->stem, stem) == 0;
     return count;
 }
 

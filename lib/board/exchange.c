@@ -15,6 +15,10 @@ void board_exchange_begin(struct hm2_board *const board, struct board_exchange *
     exchange->nonce = ++board->nonce | BOARD_NONCE_BIT;
     const uint16_t words[SCRATCH_WORDS] = {(uint16_t)exchange->nonce, (uint16_t)(exchange->nonce >> 16)};
     lbp16_builder_init(&exchange->builder, exchange->request, sizeof exchange->request);
+    /* A write to a scratch register waits for DPLL timer 4 until HM2Timeout, which another program may have left at
+     * anything (tests/data/lbp16/README.md). */
+    const uint16_t no_wait = 0;
+    (void)lbp16_add_write16(&exchange->builder, LBP16_SPACE_TIMER, LBP16_TIMER_TIMEOUT_US, 1, &no_wait, NULL);
     (void)lbp16_add_write16(&exchange->builder, LBP16_SPACE_TIMER, LBP16_TIMER_SCRATCH, SCRATCH_WORDS, words,
                             &exchange->nonce_at);
 }

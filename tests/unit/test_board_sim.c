@@ -3,6 +3,7 @@
 #include "unit.h"
 
 #include <hm2/board.h>
+#include <hm2/lbp16.h>
 #include <hm2/sim.h>
 
 #define PERIOD_NS 1000000
@@ -335,6 +336,20 @@ static void encoder_positions_do_not_jump_when_the_power_fails(void **state)
     assert_true(get(f, "packet-error") == 0);
 }
 
+static void a_wait_that_another_program_left_on_the_card_does_not_hold_set_up_up(void **state)
+{
+    struct fixture *const f = *state;
+    uint8_t request[64];
+    struct lbp16_builder builder;
+    const uint16_t longest = UINT16_MAX; /* us, for each scratch word */
+    lbp16_builder_init(&builder, request, sizeof request);
+    assert_int_equal(lbp16_add_write16(&builder, LBP16_SPACE_TIMER, LBP16_TIMER_TIMEOUT_US, 1, &longest, NULL), 0);
+    assert_int_equal(link_send(f->link, request, builder.used), 0);
+    const int64_t begin_ns = link_now_ns(f->link);
+    load(f, NULL);
+    assert_in_range(link_now_ns(f->link) - begin_ns, 1, 50000000);
+}
+
 /* ---- cost of a cycle -----------------------------------------------------------------------------------------------
  */
 
@@ -455,6 +470,7 @@ int main(void)
         TEST(a_held_up_thread_makes_the_watchdog_bite_and_says_so),
         TEST(a_power_cycle_is_survived_with_outputs_off_until_a_person_agrees),
         TEST(encoder_positions_do_not_jump_when_the_power_fails),
+        TEST(a_wait_that_another_program_left_on_the_card_does_not_hold_set_up_up),
         TEST(a_cycle_allocates_nothing_and_moves_exactly_its_packets),
         TEST(no_input_shows_what_the_card_did_not_have_in_the_cycle_claimed),
     };

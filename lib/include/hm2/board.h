@@ -52,6 +52,7 @@ HM2_API void hm2_board_free(struct hm2_board *board);
 /* Take the link over, read the card's name, cookie and IDROM, and check them. Retries lost packets; gives up after
  * about one second. Afterwards the getters below work. */
 HM2_API int HM2_MUST_CHECK hm2_board_identify(struct hm2_board *board, struct link *link, struct hm2_diag *diag);
+/* The board's own copy of its row, completed for unknown cards: compare stems, not pointers. */
 HM2_API const struct hm2_board_type *hm2_board_type(const struct hm2_board *board);
 HM2_API const struct hm2_idrom *hm2_board_idrom(const struct hm2_board *board);
 HM2_API const char *hm2_board_card_name(const struct hm2_board *board);
