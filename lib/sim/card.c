@@ -261,15 +261,6 @@ static void power_up(struct sim_card *const card)
     sim_pins_power_up(card);
 }
 
-static const struct hm2_image *image_of(const struct sim_card_options *const options,
-                                        const struct sim_profile *const profile, struct hm2_image *const room)
-{
-    if (options->image)
-        return options->image;
-    sim_profile_image(profile, room);
-    return room;
-}
-
 static int build(struct sim_card *const card, const struct sim_card_options *const options, struct hm2_diag *const diag)
 {
     const struct sim_profile *const profile = sim_profile_find(options->profile);
@@ -277,8 +268,10 @@ static int build(struct sim_card *const card, const struct sim_card_options *con
         return hm2_diag_add(diag, HM2_ERR_NOTFOUND, "no simulated card is called \"%s\"; there are: %s",
                             options->profile ? options->profile : "", sim_profile_list());
     card->profile = profile;
-    struct hm2_image room;
-    card->image = *image_of(options, profile, &room);
+    if (options->image)
+        card->image = *options->image;
+    else
+        sim_profile_image(profile, &card->image);
     sim_image_read(&card->image, &card->idrom);
     const enum sim_bus natural = profile->efinix ? SIM_BUS_ZEROS : SIM_BUS_ONES;
     const enum sim_bus bus = options->bus != SIM_BUS_OF_PROFILE ? options->bus : natural;

@@ -133,15 +133,16 @@ static const struct {
 /* "card N" in front names one card; else a command is for all of them. */
 static char *choose_card(char *const text, struct command *const c)
 {
-    unsigned number;
-    int used = 0;
-    if (strncmp(text, "card ", 5) != 0)
+    static const char prefix[] = "card ";
+    char *end;
+    if (strncmp(text, prefix, strlen(prefix)) != 0)
         return text;
-    if (sscanf(text, "card %3u %n", &number, &used) != 1 || used == 0 || number >= c->stations)
+    const unsigned long number = strtoul(text + strlen(prefix), &end, 10);
+    if (end == text + strlen(prefix) || number >= c->stations)
         return NULL;
     c->first += number;
     c->stations = 1;
-    return text + used;
+    return end;
 }
 
 bool control_command(char *const text, struct station *const stations, const unsigned count, const int64_t now_ns,
@@ -158,7 +159,7 @@ bool control_command(char *const text, struct station *const stations, const uns
     for (char *word; (word = strtok_r(rest, " \t\r\n", &state)) && c.count < MAX_WORDS; rest = NULL)
         c.words[c.count++] = word;
     for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
-        if (c.count != commands[i].words || strcmp(c.words[0], commands[i].name) != 0)
+        if (c.count == 0 || c.count != commands[i].words || strcmp(c.words[0], commands[i].name) != 0)
             continue;
         commands[i].run(&c);
         return commands[i].run == do_quit;

@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include <arpa/inet.h>
+#include <ctype.h>
 #include <errno.h>
 #include <getopt.h>
 #include <limits.h>
@@ -133,16 +134,24 @@ static int add_card(struct reading *const r, const char *const value)
     return 0;
 }
 
+static bool read_mac(const char *text, uint8_t mac[const 6])
+{
+    for (unsigned i = 0; i < 6; i++) {
+        char *end;
+        if (!isxdigit((unsigned char)*text))
+            return false;
+        const unsigned long byte = strtoul(text, &end, 16);
+        if (byte > UINT8_MAX || end - text > 2 || *end != (i < 5 ? ':' : '\0'))
+            return false;
+        mac[i] = (uint8_t)byte;
+        text = end + 1;
+    }
+    return true;
+}
+
 static int set_mac(struct reading *const r, const char *const value)
 {
-    unsigned b[6];
-    int used = 0;
-    if (sscanf(value, "%2x:%2x:%2x:%2x:%2x:%2x%n", &b[0], &b[1], &b[2], &b[3], &b[4], &b[5], &used) != 6 ||
-        value[used] != '\0')
-        return refuse(r, "--mac", value, "six bytes such as 00:60:1b:12:34:56");
-    for (unsigned i = 0; i < 6; i++)
-        r->card->mac[i] = (uint8_t)b[i];
-    return 0;
+    return read_mac(value, r->card->mac) ? 0 : refuse(r, "--mac", value, "six bytes such as 00:60:1b:12:34:56");
 }
 
 static int add_wire(struct reading *const r, const char *const value)

@@ -37,7 +37,7 @@ static void deliver(void *const context, const uint64_t client, const uint8_t *c
 void station_receive(struct station *const s, const int64_t now_ns)
 {
     uint8_t data[2048];
-    struct sockaddr_in from;
+    struct sockaddr_in from = {.sin_family = AF_INET};
     socklen_t from_len = sizeof from;
     const ssize_t len =
         recvfrom(s->socket, data, sizeof data, MSG_DONTWAIT | MSG_TRUNC, (struct sockaddr *)&from, &from_len);
