@@ -430,8 +430,18 @@ static void restart(struct sim_lbp16 *const e, const int64_t deaf_ns)
         e->ready_ns = e->now_ns + deaf_ns;
 }
 
+/* Time of the outside world at the card's present clock. */
+static int64_t card_ns(const struct sim_lbp16 *const e)
+{
+    const int64_t hz = sim_clock_low_hz(e->card);
+    const int64_t gone = e->card->clk - e->epoch_clk;
+    return e->epoch_ns + gone / hz * NS_PER_S + gone % hz * NS_PER_S / hz;
+}
+
 void sim_lbp16_power_up(struct sim_lbp16 *const e)
 {
+    if (e->has_epoch && card_ns(e) > e->now_ns)
+        e->now_ns = card_ns(e);
     restart(e, CONFIGURE_START_NS);
 }
 

@@ -8,19 +8,23 @@
 #include "replay.h"
 #include "sim_card.h"
 
-#define PORT_DATA     0x1000u
-#define PORT_DDR      0x1100u
-#define PORT_ALT      0x1200u
-#define STEP_RATE     0x2000u
-#define STEP_MODE     0x2200u
-#define STEP_LEN      0x2500u
-#define STEP_SPACE    0x2600u
-#define STEP_BASE     0x2900u
-#define IDROM         0x0400u
-#define IDROM_ENABLE  0x0800u
-#define PIN_STEP      0x81u
-#define PIN_DIR       0x82u
-#define EDGES_MAX     4096u
+#define PORT_DATA    0x1000u
+#define PORT_DDR     0x1100u
+#define PORT_ALT     0x1200u
+#define STEP_RATE    0x2000u
+#define STEP_MODE    0x2200u
+#define STEP_LEN     0x2500u
+#define STEP_SPACE   0x2600u
+#define STEP_BASE    0x2900u
+#define IDROM        0x0400u
+#define IDROM_ENABLE 0x0800u
+#define PIN_STEP     0x81u
+#define PIN_DIR      0x82u
+#define PWM_VALUE    0x4100u /* new address map */
+#define PWM_MODE     0x4200u
+#define PWM_RATE     0x4300u
+#define PWM_ENABLE   0x4500u
+#define EDGES_MAX    4096u
 
 struct edge {
     int64_t clk;
@@ -360,6 +364,33 @@ static void steps_over_a_wire_are_counted_as_the_follower_counts(void **state)
     sim_card_free(wired);
 }
 
+static void an_output_of_the_fast_clock_is_told_with_picoseconds(void **state)
+{
+    (void)state;
+    static struct edges edges;
+    edges.count = 0;
+    struct sim_card *const card = card_with("7i96s", NULL);
+    sim_card_on_edge(card, note_edge, &edges);
+    assert_int_equal(sim_card_watch_output(card, HM2_GTAG_PWMGEN, 0, PIN_STEP), 0);
+    write_now(card, PWM_MODE, 0);
+    write_now(card, PWM_ENABLE, 1);
+    write_now(card, PWM_RATE, 0xFFFF);
+    write_now(card, PWM_VALUE, 101u << 16); /* 101 of 512 counts of 5 ns: half clocks */
+    sim_card_advance(card, 100000);
+    assert_in_range(edges.count, 2 * 100000 / 257, 2 * 100000 / 255);
+    unsigned between = 0;
+    for (unsigned i = 1; i < edges.count; i++) {
+        const int64_t before_ps = edges.edge[i - 1].clk * 10000 + edges.edge[i - 1].ps;
+        const int64_t ps = edges.edge[i].clk * 10000 + edges.edge[i].ps;
+        assert_true(ps > before_ps);
+        between += edges.edge[i].ps > 0;
+        if (i > 2 && i + 1 < edges.count && edges.edge[i].level == SIM_LOW)
+            assert_in_range(ps - before_ps, 505000 - 10, 510000 + 10);
+    }
+    assert_true(between > 0);
+    sim_card_free(card);
+}
+
 static void a_power_cycle_restores_registers_and_pads(void **state)
 {
     (void)state;
@@ -408,6 +439,7 @@ int main(void)
         cmocka_unit_test(a_watched_pad_shows_the_module_behind_it_only_when_enabled),
         cmocka_unit_test(watching_changes_nothing_but_what_is_told),
         cmocka_unit_test(steps_over_a_wire_are_counted_as_the_follower_counts),
+        cmocka_unit_test(an_output_of_the_fast_clock_is_told_with_picoseconds),
         cmocka_unit_test(a_power_cycle_restores_registers_and_pads),
         cmocka_unit_test(inputs_and_watches_that_do_not_exist_are_refused),
     };

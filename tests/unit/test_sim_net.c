@@ -252,6 +252,20 @@ static void a_power_cycle_costs_a_second(void **state)
     drop(&rig);
 }
 
+static void a_card_that_was_idle_starts_as_slowly(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    sim_net_sleep_until(rig.net, INT64_C(10000) * MS);
+    sim_card_power_cycle(rig.card);
+    send_number(&rig, 8);
+    assert_int_equal(receive_number(&rig, INT64_C(10900) * MS), HM2_ERR_TIMEOUT);
+    sim_net_sleep_until(rig.net, INT64_C(11100) * MS);
+    send_number(&rig, 9);
+    assert_int_equal(receive_number(&rig, INT64_C(11200) * MS), 9);
+    drop(&rig);
+}
+
 static void faults_out_of_range_are_refused(void **state)
 {
     (void)state;
@@ -279,6 +293,7 @@ int main(void)
         cmocka_unit_test(the_same_seed_gives_the_same_faults),
         cmocka_unit_test(a_frozen_card_says_nothing_and_goes_on_after),
         cmocka_unit_test(a_power_cycle_costs_a_second),
+        cmocka_unit_test(a_card_that_was_idle_starts_as_slowly),
         cmocka_unit_test(faults_out_of_range_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -152,6 +152,8 @@ bool control_command(char *const text, struct station *const stations, const uns
     char *rest = choose_card(text, &c);
     char *state = NULL;
     answer(&c, "ok");
+    for (unsigned i = 0; i < count; i++)
+        station_run(&stations[i], now_ns);
     if (!rest) {
         answer(&c, "error: no such card");
         return false;
