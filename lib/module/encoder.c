@@ -118,6 +118,8 @@ static int bind(const struct hm2_module *const module, const struct hm2_setup *c
     if (!err)
         err = hm2_bind_group(setup, &groups[GROUP_STAMP], ctx, 0);
     for (unsigned i = 0; !err && i < module->instances; i++) {
+        ctx->encoder[i].module = module;
+        ctx->encoder[i].number = i;
         ctx->encoder[i].scale_seen = ctx->encoder[i].inverse_scale = 1.0;
         err = hm2_bind_group(setup, &groups[GROUP_ALWAYS], &ctx->encoder[i], i);
         if (!err && ctx->has_probe)

@@ -48,12 +48,15 @@ struct encoder {
     hm2_bit_t *index_invert, *index_mask, *index_mask_invert, *counter_mode, *filter;
     hm2_float_t *vel_timeout;
 
+    const struct hm2_module *module;
+    unsigned number; /* of this encoder */
+
     uint16_t counter;      /* as read last */
     int64_t raw;           /* counts since load */
     int64_t zero, latched; /* raw counts at position 0 and at the last event */
     double scale_seen;     /* usable value of the parameter */
     double inverse_scale;  /* units per count */
-    double vel_timeout_s;  /* usable value of the parameter */
+    double position_now;   /* units */
     double speed;          /* units/s */
     enum encoder_motion motion;
     uint64_t edge_ticks; /* time of the last edge on the card's clock */
@@ -63,7 +66,7 @@ struct encoder {
     uint32_t word;         /* as handed to the plan last */
     uint32_t seen;         /* control register as read last */
     uint16_t latch_before; /* latch register before arming */
-    bool latch_known;      /* latch_before was read when nothing was armed */
+    bool latch_known;      /* nothing but this search can have changed the latch since */
     bool spent;            /* what is armed in word has fired */
     enum encoder_quad quad;
 };
@@ -76,6 +79,7 @@ struct encoder_module {
 
     bool muxed, has_probe;
     bool started;
+    unsigned look; /* encoder whose parameters are looked at next; those of all when it is out of range */
     uint32_t clock_hz;
     /* Time stamps. The card's 16-bit counter is extended to 64 bits. */
     bool timebase_known; /* the divisor in use is the one computed with */
@@ -112,7 +116,7 @@ uint32_t encoder_divisor(uint32_t clock_hz, uint32_t tick_hz, double *tick_s);
 
 /* Bits that arm what the pins ask for, as far as it is safe in this cycle. polarity is ENCODER_INDEX_HIGH or 0. */
 uint32_t encoder_arm(struct encoder *enc, uint32_t polarity, bool has_probe);
-/* See whether an armed latch has fired; called with the counts of the same reply already added. */
+/* See whether a latch that is armed has fired; called with the counts of the same reply already added. */
 void encoder_check_latch(struct encoder *enc, uint32_t control);
 /* The card lost its state: nothing is armed in it, and what it reads is no event. */
 void encoder_forget_latch(struct encoder *enc);

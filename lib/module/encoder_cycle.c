@@ -7,6 +7,7 @@
  */
 #include "encoder.h"
 
+#include <limits.h>
 #include <math.h>
 
 #include <hm2/bytes.h>
@@ -47,18 +48,38 @@ static double seconds(const struct encoder_module *const ctx, const uint64_t fro
     return (double)(int64_t)(to - from) * ctx->tick_s;
 }
 
+static void take_scale(struct encoder *const enc)
+{
+    double scale = *enc->scale;
+    if (!isfinite(scale) || scale == 0.0 || !isfinite(1.0 / scale)) {
+        hm2_notice(enc->module, HM2_NOTICE_VALUE_INVALID, enc->number, scale);
+        *enc->scale = scale = 1.0;
+    }
+    enc->scale_seen = scale;
+    enc->inverse_scale = 1.0 / scale;
+}
+
+static double usable_timeout(const struct encoder *const enc)
+{
+    const double timeout_s = *enc->vel_timeout;
+    if (timeout_s == timeout_s)
+        return timeout_s;
+    hm2_notice(enc->module, HM2_NOTICE_VALUE_INVALID, enc->number, timeout_s);
+    return *enc->vel_timeout = VEL_TIMEOUT;
+}
+
 /* No edge in this cycle: not faster than one count in the time since the last. */
 static void coast(struct encoder *const enc, const struct encoder_module *const ctx)
 {
     const double since_s = seconds(ctx, enc->edge_ticks, ctx->now_ticks);
-    if (since_s >= enc->vel_timeout_s) {
+    if (since_s >= usable_timeout(enc)) {
         enc->speed = 0.0;
         enc->motion = ENCODER_STOPPED;
         return;
     }
     if (fabs(enc->speed) * since_s > fabs(enc->inverse_scale))
         enc->speed = copysign(fabs(enc->inverse_scale) / since_s, enc->speed);
-    *enc->position_interpolated = *enc->position + since_s * enc->speed;
+    *enc->position_interpolated = enc->position_now + since_s * enc->speed;
 }
 
 static void moved(struct encoder *const enc, const struct encoder_module *const ctx, const uint32_t count,
@@ -79,7 +100,7 @@ static void moved(struct encoder *const enc, const struct encoder_module *const 
 static void estimate_speed(struct encoder *const enc, const struct encoder_module *const ctx, const uint32_t count,
                            const int32_t counts)
 {
-    *enc->position_interpolated = *enc->position;
+    *enc->position_interpolated = enc->position_now;
     if (!ctx->timebase_known) {
         enc->motion = ENCODER_STOPPED;
     } else if (enc->motion == ENCODER_STOPPED) {
@@ -97,77 +118,49 @@ static void estimate_speed(struct encoder *const enc, const struct encoder_modul
     }
 }
 
-static void take_scale(struct encoder *const enc, const struct hm2_module *const module, const unsigned number)
-{
-    double scale = *enc->scale;
-    if (!isfinite(scale) || scale == 0.0 || !isfinite(1.0 / scale)) {
-        hm2_notice(module, HM2_NOTICE_VALUE_INVALID, number, scale);
-        *enc->scale = scale = 1.0;
-    }
-    enc->scale_seen = scale;
-    enc->inverse_scale = 1.0 / scale;
-}
-
-static void take_timeout(struct encoder *const enc, const struct hm2_module *const module, const unsigned number)
-{
-    double timeout_s = *enc->vel_timeout;
-    if (!(timeout_s == timeout_s)) {
-        hm2_notice(module, HM2_NOTICE_VALUE_INVALID, number, timeout_s);
-        *enc->vel_timeout = timeout_s = VEL_TIMEOUT;
-    }
-    enc->vel_timeout_s = timeout_s;
-}
-
-static void show_levels(struct encoder *const enc, const struct hm2_module *const module, const unsigned number,
-                        const uint32_t control)
-{
-    const bool error = enc->quad == ENCODER_QUAD_REPORT && (control & ENCODER_QUAD_ERROR);
-    *enc->input_a = control & ENCODER_A;
-    *enc->input_b = control & ENCODER_B;
-    *enc->input_index = control & ENCODER_INDEX;
-    *enc->quad_error = error;
-    if (error)
-        hm2_notice(module, HM2_NOTICE_QUAD_ERROR, number, 0.0);
-}
-
 /* Pins of 32 bits show the low half; the positions come from all 64 bits (hal-interface 6, row 10). */
 static int32_t low_half(const int64_t counts)
 {
     return (int32_t)(uint32_t)(uint64_t)counts;
 }
 
-static void show_positions(struct encoder *const enc)
+static inline void show_positions(struct encoder *const enc)
 {
-    const int64_t count = enc->raw - enc->zero, latched = enc->latched - enc->zero;
-    *enc->rawcounts = low_half(enc->raw);
-    *enc->rawlatch = low_half(enc->latched);
-    *enc->count = low_half(count);
-    *enc->count_latched = low_half(latched);
-    *enc->position = (double)count / enc->scale_seen;
-    *enc->position_latched = (double)latched / enc->scale_seen;
+    const int64_t raw = enc->raw, raw_latched = enc->latched, zero = enc->zero;
+    const double scale = enc->scale_seen;
+    enc->position_now = (double)(raw - zero) / scale;
+    *enc->rawcounts = low_half(raw);
+    *enc->rawlatch = low_half(raw_latched);
+    *enc->count = low_half(raw - zero);
+    *enc->count_latched = low_half(raw_latched - zero);
+    *enc->position = enc->position_now;
+    *enc->position_latched = (double)(raw_latched - zero) / scale;
 }
 
-static void unpack_one(struct encoder *const enc, const struct hm2_module *const module, const unsigned number)
+static inline void unpack_one(struct encoder *const enc, const struct encoder_module *const ctx, const uint32_t count,
+                              const uint32_t control)
 {
-    const struct encoder_module *const ctx = module->context;
-    const uint32_t count = hm2_window_get(&ctx->counts, number), control = hm2_window_get(&ctx->controls, number);
     if (!(*enc->scale == enc->scale_seen))
-        take_scale(enc, module, number);
-    if (!(*enc->vel_timeout == enc->vel_timeout_s))
-        take_timeout(enc, module, number);
-
+        take_scale(enc);
     const int32_t counts = hm2_delta16(COUNT_OF(count), enc->counter);
     enc->counter = COUNT_OF(count);
     enc->raw += counts;
     enc->seen = control;
-    encoder_check_latch(enc, control);
+    if (enc->word & ENCODER_LATCHES)
+        encoder_check_latch(enc, control);
     /* An old write that the network delivered late or twice has undone a newer one: send it again. */
     if (((control ^ enc->word) & ENCODER_READBACK) && hm2_section_confirmed(&enc->control))
         hm2_section_touch(&enc->control);
     if (*enc->reset)
         enc->zero = enc->latched = enc->raw;
     show_positions(enc);
-    show_levels(enc, module, number, control);
+    *enc->input_a = control & ENCODER_A;
+    *enc->input_b = control >> 1 & 1u;
+    *enc->input_index = control >> 2 & 1u;
+    const bool error = enc->quad == ENCODER_QUAD_REPORT && (control & ENCODER_QUAD_ERROR);
+    *enc->quad_error = error;
+    if (error)
+        hm2_notice(enc->module, HM2_NOTICE_QUAD_ERROR, enc->number, 0.0);
     estimate_speed(enc, ctx, count, counts);
     *enc->velocity = enc->speed;
     *enc->velocity_rpm = enc->speed * S_PER_MINUTE;
@@ -181,8 +174,9 @@ void encoder_unpack(struct hm2_module *const module, const struct hm2_cycle *con
     read_clock(ctx, cycle);
     if (!ctx->timebase_known)
         ctx->timebase_known = hm2_section_confirmed(&ctx->divisor);
-    for (unsigned i = 0; i < module->instances; i++)
-        unpack_one(&ctx->encoder[i], module, i);
+    const uint8_t *const counts = ctx->counts.bytes, *const controls = ctx->controls.bytes;
+    for (struct encoder *enc = ctx->encoder, *const end = enc + module->instances; enc < end; enc++)
+        unpack_one(enc, ctx, hm2_get_le32(counts + 4u * enc->number), hm2_get_le32(controls + 4u * enc->number));
 }
 
 /* At load the raw counts begin with the counter's value and the position with 0; after the card's power came back both
@@ -209,5 +203,6 @@ void encoder_start(struct hm2_module *const module, const struct hm2_cycle *cons
         }
         *enc->velocity = *enc->velocity_rpm = 0.0;
     }
+    ctx->look = UINT_MAX;
     ctx->started = true;
 }

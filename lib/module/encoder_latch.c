@@ -25,11 +25,18 @@ uint32_t encoder_arm(struct encoder *const enc, const uint32_t polarity, const b
     else if (has_probe && *enc->probe_enable)
         wanted = ENCODER_LATCH_PROBE | ENCODER_JUST_ONCE;
     const uint32_t armed = enc->word & ENCODER_LATCHES;
-    if (!armed)
-        return (enc->seen ^ polarity) & (ENCODER_LATCH_INDEX | ENCODER_JUST_ONCE | ENCODER_INDEX_HIGH) ? 0 : wanted;
+    if (!armed) {
+        if (!wanted || (enc->seen ^ polarity) & (ENCODER_LATCH_INDEX | ENCODER_JUST_ONCE | ENCODER_INDEX_HIGH))
+            return 0;
+        enc->latch_before = (uint16_t)(enc->seen >> 16);
+        enc->latch_known = true;
+        return wanted;
+    }
     /* From armed the way leads over disarmed, also when the pin was set again at once. */
     const bool keep = !enc->spent && armed == (wanted & ENCODER_LATCHES);
     enc->spent = false;
+    if (!keep)
+        enc->seen |= ENCODER_JUST_ONCE; /* until the card is seen without it */
     return keep ? wanted : 0;
 }
 
@@ -51,12 +58,7 @@ void encoder_check_latch(struct encoder *const enc, const uint32_t control)
 {
     const uint16_t latch = (uint16_t)(control >> 16);
     const uint32_t armed = enc->word & ENCODER_LATCHES;
-    if (!armed) {
-        enc->latch_before = latch;
-        enc->latch_known = !(control & (ENCODER_LATCH_INDEX | ENCODER_JUST_ONCE));
-        return;
-    }
-    if (enc->spent)
+    if (!armed || enc->spent)
         return;
     const bool cleared_itself = !(control & armed) && (control & ENCODER_JUST_ONCE);
     const bool latched_anew = enc->latch_known && latch != enc->latch_before;

@@ -103,6 +103,23 @@ static uint32_t control_word(struct encoder *const enc, const bool has_probe)
     return word;
 }
 
+static void pack_control(struct encoder *const enc, const bool has_probe)
+{
+    const uint32_t word = control_word(enc, has_probe);
+    if (word != enc->word) {
+        enc->word = word;
+        hm2_section_set(&enc->control, 0, word);
+    }
+}
+
+/* Does a pin want something of the control word, or did one? Parameters cannot be linked to signals, only a person sets
+ * them: one encoder's are looked at in each cycle. */
+static bool is_busy(const struct encoder *const enc)
+{
+    return *enc->index_enable || *enc->quad_error_enable || (enc->word & (ENCODER_LATCHES | ENCODER_QUAD_ERROR)) ||
+           enc->quad != ENCODER_QUAD_OFF || (enc->probe_enable && *enc->probe_enable);
+}
+
 void encoder_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     (void)cycle;
@@ -112,14 +129,12 @@ void encoder_pack(struct hm2_module *const module, const struct hm2_cycle *const
     pack_divisor(ctx);
     pack_filter(ctx, module);
     hm2_timer_pack(&ctx->timer, module);
-    for (unsigned i = 0; i < module->instances; i++) {
-        struct encoder *const enc = &ctx->encoder[i];
-        const uint32_t word = control_word(enc, ctx->has_probe);
-        if (word != enc->word) {
-            enc->word = word;
-            hm2_section_set(&enc->control, 0, word);
-        }
-    }
+    const unsigned look = ctx->look;
+    const bool look_at_all = look >= module->instances;
+    ctx->look = look_at_all ? 0 : look + 1 < module->instances ? look + 1 : 0;
+    for (struct encoder *enc = ctx->encoder, *const end = enc + module->instances; enc < end; enc++)
+        if (is_busy(enc) || look_at_all || enc->number == look)
+            pack_control(enc, ctx->has_probe);
 }
 
 static int add_word(struct hm2_setup *const setup, struct hm2_section *const section, const struct hm2_md *const md,
