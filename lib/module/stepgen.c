@@ -4,6 +4,7 @@
  */
 #include "stepgen.h"
 
+#include <limits.h>
 #include <math.h>
 
 #include "bind.h"
@@ -185,6 +186,7 @@ static void start(struct hm2_module *const module, const struct hm2_cycle *const
     }
     if (ctx->started)
         stepgen_forget_tables(ctx, module->instances);
+    ctx->look = UINT_MAX;
     ctx->started = true;
 }
 
@@ -197,7 +199,7 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     const uint8_t *const accumulators = ctx->accumulators.bytes;
     for (struct stepgen *gen = ctx->generator, *const end = gen + module->instances; gen < end; gen++) {
         if (!(*gen->position_scale == gen->scale))
-            stepgen_take_scale(gen);
+            stepgen_take_limits(gen); /* they are in units of the scale */
         const uint32_t accumulator = hm2_get_le32(accumulators + 4u * gen->number);
         const int64_t moved = hm2_delta32(accumulator, gen->accumulator);
         gen->subcounts = (int64_t)((uint64_t)gen->subcounts + (uint64_t)moved);

@@ -62,6 +62,7 @@ struct stepgen_module {
     struct hm2_timer timer;
     bool has_swap, has_latch;
     bool started;
+    unsigned look; /* generator whose parameters are looked at next; those of all when it is out of range */
     double clock_hz;
     double max_step_hz; /* half the clock: what the signed rate register can say */
     int64_t period_seen_ns;
@@ -74,8 +75,6 @@ struct stepgen_module {
 /* ---- stepgen_motion.c: arithmetic and rates, realtime safe ----------------------------------------------------------
  */
 
-/* Take position-scale over, after making it usable. */
-void stepgen_take_scale(struct stepgen *gen);
 /* Take position-scale, maxvel, maxaccel and the pulse times over as limits; unusable values are rewritten. */
 void stepgen_take_limits(struct stepgen *gen);
 /* The cycle's rates, and what has changed. */

@@ -18,7 +18,7 @@ static double report(const struct stepgen *const gen, const enum hm2_notice noti
     return used;
 }
 
-void stepgen_take_scale(struct stepgen *const gen)
+static void take_scale(struct stepgen *const gen)
 {
     double scale = *gen->position_scale;
     if (!isfinite(scale))
@@ -27,8 +27,6 @@ void stepgen_take_scale(struct stepgen *const gen)
         scale = report(gen, HM2_NOTICE_VALUE_CLAMPED, scale, signbit(scale) ? -1.0 : 1.0);
     *gen->position_scale = scale;
     gen->scale = scale;
-    /* The limits are in units of the scale: have them taken over again. */
-    gen->maxvel_seen = NAN;
 }
 
 /* A limit that must be finite and not negative; 0 = none. */
@@ -43,7 +41,7 @@ void stepgen_take_limits(struct stepgen *const gen)
 {
     const struct stepgen_module *const ctx = gen->module->context;
     if (!(*gen->position_scale == gen->scale))
-        stepgen_take_scale(gen);
+        take_scale(gen);
 
     const uint32_t len_ns = *gen->time_ns[STEPGEN_STEPLEN], space_ns = *gen->time_ns[STEPGEN_STEPSPACE];
     const double pulse_ns = (double)len_ns + (double)space_ns;
@@ -149,16 +147,16 @@ static double next_velocity(struct stepgen *const gen, const double period_s, co
     return velocity > 0.0 ? gen->limit : velocity < 0.0 ? -gen->limit : 0.0;
 }
 
-/* Is a parameter not as it was seen last? Written so that a NaN counts as changed. */
+/* Is a parameter not as it was seen last? Written so that a NaN counts as changed. Parameters cannot be linked to
+ * signals, only a person sets them: those of one generator are looked at in each cycle. */
 static bool changed(const struct stepgen *const gen)
 {
     const uint32_t words = (*gen->time_ns[STEPGEN_DIRSETUP] ^ gen->time_seen[STEPGEN_DIRSETUP]) |
                            (*gen->time_ns[STEPGEN_DIRHOLD] ^ gen->time_seen[STEPGEN_DIRHOLD]) |
                            (*gen->time_ns[STEPGEN_STEPLEN] ^ gen->time_seen[STEPGEN_STEPLEN]) |
                            (*gen->time_ns[STEPGEN_STEPSPACE] ^ gen->time_seen[STEPGEN_STEPSPACE]) |
-                           (*gen->step_type ^ gen->type_seen) | gen->watched;
-    return words != 0 || !(*gen->maxvel == gen->maxvel_seen) || !(*gen->maxaccel == gen->maxaccel_seen) ||
-           !(*gen->position_scale == gen->scale);
+                           (*gen->step_type ^ gen->type_seen);
+    return words != 0 || !(*gen->maxvel == gen->maxvel_seen) || !(*gen->maxaccel == gen->maxaccel_seen);
 }
 
 void stepgen_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -175,10 +173,13 @@ void stepgen_pack(struct hm2_module *const module, const struct hm2_cycle *const
      * wrong (hal-interface 6, row 5a). */
     const bool may_move = !cycle->bitten;
     const double period_s = cycle->period_s, per_second = ctx->inverse_period;
+    const unsigned look = ctx->look;
+    const bool look_at_all = look >= module->instances;
+    ctx->look = look + 1 < module->instances ? look + 1 : 0;
     uint8_t *const rates = ctx->rates.bytes;
     for (struct stepgen *gen = ctx->generator, *const end = gen + module->instances; gen < end; gen++) {
         int32_t rate = 0;
-        if (changed(gen))
+        if (gen->watched || ((gen->number == look || look_at_all) && changed(gen)))
             stepgen_take_settings(gen);
         if (*gen->enable && may_move) {
             gen->velocity = next_velocity(gen, period_s, per_second);

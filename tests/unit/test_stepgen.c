@@ -142,6 +142,22 @@ static void every_generator_has_fourteen_pins_and_twelve_parameters(void **state
     rig_free(bench.rig);
 }
 
+static void a_changed_parameter_is_seen_within_as_many_cycles_as_there_are_generators(void **state)
+{
+    (void)state;
+    struct bench bench = bench_open(rig_image_7i96s(), "");
+    run_many(&bench, 7);
+    for (unsigned i = 0; i < GENERATORS; i++) {
+        char name[64];
+        (void)snprintf(name, sizeof name, "stepgen.%02u.steplen", i);
+        rig_set(bench.rig, name, 1000);
+    }
+    run_many(&bench, GENERATORS);
+    for (unsigned i = 0; i < GENERATORS; i++)
+        assert_int_equal(rig_written(bench.rig, (uint16_t)(STEPLEN + 4 * i)), 100);
+    rig_free(bench.rig);
+}
+
 static void without_generators_in_use_there_is_nothing(void **state)
 {
     (void)state;
@@ -190,7 +206,7 @@ static void times_are_truncated_to_clocks_and_clamped_to_fourteen_bits(void **st
     assert_int_equal(stepgen_clocks(163840, 100000000), 0x3FFF);
     assert_int_equal(stepgen_clocks(UINT32_MAX, UINT32_MAX), 0x3FFF);
     assert_int_equal(stepgen_longest_ns(100000000), 163830);
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set(&bench, "steplen", 1e6);
     set(&bench, "dirsetup", 2000);
     run(&bench);
@@ -207,7 +223,7 @@ static void times_are_truncated_to_clocks_and_clamped_to_fourteen_bits(void **st
 static void a_timer_number_selects_a_timer_and_nonsense_the_reference(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     static const struct {
         double pin;
         uint32_t word;
@@ -261,7 +277,7 @@ static void a_table_is_pushed_last_entry_first_then_its_length_then_the_mode(voi
     (void)state;
     size_t at = 0;
     struct trace_file trace = trace_load("stepgen");
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set(&bench, "table-data-0", 0x01020408);
     set(&bench, "table-data-1", 0x3F);
     set(&bench, "step_type", 5);
@@ -288,7 +304,7 @@ static void a_table_is_pushed_last_entry_first_then_its_length_then_the_mode(voi
 static void two_equal_changes_of_a_table_do_not_cancel(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set(&bench, "step_type", 8);
     run_many(&bench, 3);
     assert_false(rig_wrote(bench.rig, TABLE));
@@ -304,7 +320,7 @@ static void two_equal_changes_of_a_table_do_not_cancel(void **state)
 static void a_table_that_is_too_long_is_refused(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set(&bench, "step_type", 17);
     run(&bench);
     assert_int_equal(get(&bench, "step_type"), 0);
@@ -369,7 +385,7 @@ static void the_position_starts_at_zero_and_survives_a_power_cycle(void **state)
 static void a_million_wraps_in_both_directions_do_not_drift(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     struct stepgen_module *const ctx = bench.module->context;
     const uint32_t leap = 0x7FFFFFFF;
     const unsigned leaps = 2000001;
@@ -391,7 +407,7 @@ static void a_million_wraps_in_both_directions_do_not_drift(void **state)
 static void position_reset_holds_the_position_at_zero(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     rig_put(bench.rig, ACCUMULATOR, 0x00050000);
     set(&bench, "position-reset", 1);
     rig_cycle(bench.rig);
@@ -411,7 +427,7 @@ static void position_reset_holds_the_position_at_zero(void **state)
 static void a_disabled_generator_stands_still(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set(&bench, "position-cmd", 100);
     set(&bench, "velocity-cmd", 100);
     for (int mode = 0; mode < 2; mode++) {
@@ -426,7 +442,7 @@ static void a_disabled_generator_stands_still(void **state)
 static void velocity_mode_ramps_with_maxaccel_up_to_maxvel(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set_fast(&bench);
     set(&bench, "position-scale", 200);
     set(&bench, "maxvel", 50);
@@ -454,7 +470,7 @@ static void velocity_mode_ramps_with_maxaccel_up_to_maxvel(void **state)
 static void maxvel_is_clamped_to_what_the_pulse_times_allow(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set_fast(&bench);
     set(&bench, "position-scale", -200);
     set(&bench, "maxvel", 1e6);
@@ -491,7 +507,7 @@ static void position_mode_follows_an_s_curve_within_one_step(void **state)
     (void)state;
     static const double scales[] = {200, -200, 4000, 1};
     for (size_t i = 0; i < sizeof scales / sizeof scales[0]; i++) {
-        struct bench bench = bench_open(rig_image_7i96s(), "");
+        struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
         struct hm2_scurve there, back;
         const double scale = fabs(scales[i]);
         assert_int_equal(hm2_scurve_plan(&there, 20000 / scale, 20000 / scale, 100000 / scale, 2e6 / scale), 0);
@@ -514,7 +530,7 @@ static void position_mode_follows_an_s_curve_within_one_step(void **state)
 static void a_lost_cycle_is_made_good(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set_fast(&bench);
     set(&bench, "position-scale", 200);
     set(&bench, "maxaccel", 1000);
@@ -552,7 +568,7 @@ static void position_mode_is_the_documented_algorithm(void **state)
     (void)state;
     static const double accelerations[] = {1000, 20, 0};
     for (size_t k = 0; k < sizeof accelerations / sizeof accelerations[0]; k++) {
-        struct bench bench = bench_open(rig_image_7i96s(), "");
+        struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
         set_fast(&bench);
         set(&bench, "position-scale", 1000);
         set(&bench, "maxaccel", accelerations[k]);
@@ -579,7 +595,7 @@ static void position_mode_is_the_documented_algorithm(void **state)
 static void a_command_beyond_the_limit_is_reported(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set_fast(&bench);
     set(&bench, "maxvel", 1000);
     set(&bench, "enable", 1);
@@ -594,7 +610,7 @@ static void a_command_beyond_the_limit_is_reported(void **state)
 static void a_bite_stops_the_generators_and_they_start_from_rest(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set_fast(&bench);
     set(&bench, "maxaccel", 1000);
     set(&bench, "control-type", 1);
@@ -618,7 +634,7 @@ static void hostile_pins_never_leave_the_limits(void **state)
     static const double evil[] = {NAN,  INFINITY, -INFINITY, 1e308, -1e308, 1e-308, 0.0, -0.0,
                                   1e18, -1e18,    4.9e-324,  1.0,   -1.0,   1e-7,   2.5};
     static const char *const names[] = {"position-cmd", "velocity-cmd", "position-scale", "maxvel", "maxaccel"};
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     uint32_t seed = 12345;
     set(&bench, "enable", 1);
     for (unsigned i = 0; i < 20000; i++) {
@@ -648,7 +664,7 @@ static void hostile_pins_never_leave_the_limits(void **state)
 static void a_command_that_is_no_number_holds_the_position(void **state)
 {
     (void)state;
-    struct bench bench = bench_open(rig_image_7i96s(), "");
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
     set_fast(&bench);
     set(&bench, "position-scale", 100);
     set(&bench, "maxaccel", 1000);
@@ -665,104 +681,12 @@ static void a_command_that_is_no_number_holds_the_position(void **state)
     rig_free(bench.rig);
 }
 
-/* ---- index and probe --------------------------------------------------------------------------------------------- */
-
-/* The latch register: what was written, but for latch bits that have fired, and the latched position. */
-static void put_mode(const struct bench *const bench, const uint32_t fired, const uint32_t position)
-{
-    rig_put(bench->rig, MODE, (rig_written(bench->rig, MODE) & 0xFFu & ~fired) | (position & 0xFFFFFF00u));
-}
-
-static void an_index_zeroes_the_position_where_it_was(void **state)
-{
-    (void)state;
-    struct bench bench = bench_open(image_of_version(0xC2), "");
-    set(&bench, "position-scale", 2);
-    set(&bench, "index-invert", 1);
-    rig_cycle(bench.rig);
-    set(&bench, "index-enable", 1);
-    rig_cycle(bench.rig);
-    assert_int_equal(rig_written(bench.rig, MODE), 0x30);
-    put_mode(&bench, 0, 0);
-    rig_put(bench.rig, ACCUMULATOR, 0x00040000);
-    rig_cycle(bench.rig);
-    assert_true(get(&bench, "index-enable") == 1.0);
-    put_mode(&bench, 0x10, 0x00058000);
-    rig_put(bench.rig, ACCUMULATOR, 0x00060000);
-    rig_cycle(bench.rig);
-    assert_true(get(&bench, "index-enable") == 0.0);
-    assert_true(get(&bench, "position-latch") == 2.75);
-    assert_true(get(&bench, "position-fb") == 0.25);
-    assert_int_equal(rig_written(bench.rig, MODE), 0x20);
-    rig_free(bench.rig);
-}
-
-static void a_probe_latches_without_zeroing(void **state)
-{
-    (void)state;
-    struct bench bench = bench_open(image_of_version(0xC2), "");
-    rig_cycle(bench.rig);
-    set(&bench, "probe-enable", 1);
-    rig_cycle(bench.rig);
-    assert_int_equal(rig_written(bench.rig, MODE), 0x40);
-    put_mode(&bench, 0x40, 0x00018000);
-    rig_put(bench.rig, ACCUMULATOR, 0x00020000);
-    rig_cycle(bench.rig);
-    assert_true(get(&bench, "probe-enable") == 0.0);
-    assert_true(get(&bench, "position-latch") == 1.5);
-    assert_true(get(&bench, "position-fb") == 2.0);
-    rig_free(bench.rig);
-}
-
-static void a_lost_arming_write_is_no_index(void **state)
-{
-    (void)state;
-    struct bench bench = bench_open(image_of_version(0xC2), "");
-    rig_cycle(bench.rig);
-    set(&bench, "index-enable", 1);
-    bench.rig->lose_writes = true;
-    for (unsigned i = 0; i < 3; i++) {
-        rig_cycle(bench.rig);
-        put_mode(&bench, 0, 0x00070000);
-        assert_int_equal(rig_written(bench.rig, MODE), 0);
-    }
-    assert_true(get(&bench, "index-enable") == 1.0);
-    bench.rig->lose_writes = false;
-    rig_cycle(bench.rig); /* still unconfirmed: what is read now was read before this write */
-    assert_true(get(&bench, "index-enable") == 1.0);
-    assert_int_equal(rig_written(bench.rig, MODE), 0x10);
-    put_mode(&bench, 0x10, 0x00070000);
-    rig_cycle(bench.rig);
-    assert_true(get(&bench, "index-enable") == 0.0);
-    rig_free(bench.rig);
-}
-
-static void a_new_search_right_after_an_index_is_armed_anew(void **state)
-{
-    (void)state;
-    struct bench bench = bench_open(image_of_version(0xC2), "");
-    rig_cycle(bench.rig);
-    set(&bench, "index-enable", 1);
-    rig_cycle(bench.rig);
-    put_mode(&bench, 0x10, 0);
-    rig_read(bench.rig);
-    assert_true(get(&bench, "index-enable") == 0.0);
-    set(&bench, "index-enable", 1); /* before the next write */
-    rig_write_out(bench.rig);
-    for (unsigned i = 0; i < 4; i++) {
-        put_mode(&bench, 0, 0);
-        rig_cycle(bench.rig);
-        assert_true(get(&bench, "index-enable") == 1.0);
-    }
-    assert_int_equal(rig_written(bench.rig, MODE), 0x10);
-    rig_free(bench.rig);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_default_times_are_the_longest_and_the_generators_get_their_clock),
         cmocka_unit_test(every_generator_has_fourteen_pins_and_twelve_parameters),
+        cmocka_unit_test(a_changed_parameter_is_seen_within_as_many_cycles_as_there_are_generators),
         cmocka_unit_test(without_generators_in_use_there_is_nothing),
         cmocka_unit_test(pins_up_to_the_width_are_claimed_and_driven_from_the_first_write_on),
         cmocka_unit_test(outputs_are_named_as_in_aliases),
@@ -787,10 +711,6 @@ int main(void)
         cmocka_unit_test(a_bite_stops_the_generators_and_they_start_from_rest),
         cmocka_unit_test(hostile_pins_never_leave_the_limits),
         cmocka_unit_test(a_command_that_is_no_number_holds_the_position),
-        cmocka_unit_test(an_index_zeroes_the_position_where_it_was),
-        cmocka_unit_test(a_probe_latches_without_zeroing),
-        cmocka_unit_test(a_lost_arming_write_is_no_index),
-        cmocka_unit_test(a_new_search_right_after_an_index_is_armed_anew),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
