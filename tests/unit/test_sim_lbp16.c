@@ -367,6 +367,51 @@ static void a_card_that_is_busy_takes_the_next_packet_afterwards(void **state)
     sim_card_free(card);
 }
 
+/* A DPLL at about 1 kHz: 2^42 / baserate * prescale clocks (register map 3.15). */
+static void a_wait_for_the_dpll_ends_at_its_edge(void **state)
+{
+    (void)state;
+    struct sim_card *const card = card_of("7i96s");
+    uint8_t request[32], reply[8];
+    int64_t reply_ns = 0;
+    const int64_t period_ns = INT64_C(1000000);
+    exchange(card, "01C20072 00000001", "");
+    exchange(card, "01C20070 77BEA702", ""); /* 44547703: 2^42 / it = 98728 clocks, 0.987 ms */
+    exchange(card, "01D90000 0000", "");
+    const size_t len = hex_bytes("01D10400 D007 01510600 01590000", request, sizeof request); /* 2000 us at most */
+    int64_t ends[4];
+    for (unsigned i = 0; i < 4; i++) {
+        const int64_t now_ns = 10 * period_ns + i * 2 * period_ns;
+        assert_int_equal(sim_card_packet(card, now_ns, request, len, reply, sizeof reply, &reply_ns), 4);
+        assert_int_equal(hm2_get_le16(reply + 2), 0); /* no time-out */
+        ends[i] = reply_ns;
+        const int64_t took_us = (reply_ns - now_ns) / US;
+        assert_in_range(hm2_get_le16(reply), took_us > 20 ? took_us - 20 : 0, took_us);
+        assert_in_range(took_us, 5, 1020);
+    }
+    for (unsigned i = 1; i < 4; i++) {
+        const int64_t gap_ns = ends[i] - ends[i - 1];
+        const int64_t periods = (gap_ns + 493640) / 987280;
+        assert_in_range(gap_ns - periods * 987280 + 2000, 0, 4000);
+    }
+    sim_card_free(card);
+}
+
+static void a_udp_length_that_lies_ends_the_packet_early(void **state)
+{
+    (void)state;
+    struct sim_card *const card = recorded_card();
+    const struct flow flow = {5000, 27181, {192, 168, 1, 121}};
+    uint8_t frame[MAX_FRAME], reply[MAX_FRAME], payload[8];
+    hex_bytes("01420001 01420401", payload, sizeof payload);
+    for (unsigned length = 0; length < 8; length++) {
+        const size_t len = udp_frame(frame, &flow, payload, sizeof payload);
+        put_be16(frame + 38, length);
+        assert_int_equal(sim_card_frame(card, 0, frame, len, reply, sizeof reply, NULL), HEADER_BYTES + 4);
+    }
+    sim_card_free(card);
+}
+
 static void error_counters_stop_at_their_end(void **state)
 {
     (void)state;
@@ -410,6 +455,8 @@ int main(void)
         cmocka_unit_test(a_page_write_wraps_within_its_page),
         cmocka_unit_test(a_truncated_write_takes_what_the_memory_holds),
         cmocka_unit_test(a_card_that_is_busy_takes_the_next_packet_afterwards),
+        cmocka_unit_test(a_wait_for_the_dpll_ends_at_its_edge),
+        cmocka_unit_test(a_udp_length_that_lies_ends_the_packet_early),
         cmocka_unit_test(error_counters_stop_at_their_end),
         cmocka_unit_test(hostile_packets_are_survived),
     };
