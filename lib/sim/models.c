@@ -4,6 +4,10 @@
 
 extern const struct sim_module_ops sim_encoder_ops;
 extern const struct sim_module_ops sim_hm2dpll_ops;
+extern const struct sim_module_ops sim_inm_ops;
+extern const struct sim_module_ops sim_inmux_ops;
+extern const struct sim_module_ops sim_outm_ops;
+extern const struct sim_module_ops sim_ssr_ops;
 extern const struct sim_module_ops sim_ioport_ops;
 extern const struct sim_module_ops sim_irq_ops;
 extern const struct sim_module_ops sim_led_ops;
@@ -24,5 +28,9 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_encoder_ops,       /* 04 */
     &sim_muxed_encoder_ops, /* 0C */
     &sim_muxed_select_ops,  /* 0D */
+    &sim_inm_ops,           /* 23 */
+    &sim_inmux_ops,         /* 1E */
+    &sim_outm_ops,          /* 2D */
+    &sim_ssr_ops,           /* C3 */
     NULL,
 };
