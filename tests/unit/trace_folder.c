@@ -33,20 +33,15 @@ static void on_result(void *const context, const char *const test, const bool pa
         print_error("%s/%s: %s\n", (const char *)context, test, difference);
 }
 
-struct replay_totals replay_data_test(const char *const name, const char *const only_test)
+struct replay_totals replay_data(const char *const name)
 {
     char folder[64];
     snprintf(folder, sizeof folder, "%s", name);
     const struct replay_files files = {.load = load, .list = list, .context = folder};
-    const struct replay_options options = {.only_test = only_test, .on_result = on_result, .context = folder};
+    const struct replay_options options = {.on_result = on_result, .context = folder};
     struct replay_totals totals = {0};
     struct hm2_diag diag = {0};
     if (replay_folder(name, &files, &options, &totals, &diag))
         fail_msg("%s", diag.text);
     return totals;
-}
-
-struct replay_totals replay_data(const char *const name)
-{
-    return replay_data_test(name, NULL);
 }

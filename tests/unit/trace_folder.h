@@ -5,9 +5,7 @@
 
 #include "replay.h"
 
-/* Replays tests/data/NAME, or one test of it, and prints what differs. Fails the running test when the folder cannot be
- * played. */
+/* Replays tests/data/NAME and prints what differs. Fails the running test when the folder cannot be played. */
 struct replay_totals replay_data(const char *name);
-struct replay_totals replay_data_test(const char *name, const char *only_test);
 
 #endif
