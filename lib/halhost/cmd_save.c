@@ -89,20 +89,33 @@ static void save_nets_long(struct hal_session *const session, const bool arrows)
     }
 }
 
-/* Pins of one direction (or all) of a signal, the first with an arrow in front when there are pins before it. */
-static void net_pins(struct hal_session *const session, const struct hh_signal *const signal, const int dir,
-                     const char *const arrow)
+/* Pins of one direction of a signal. halcmd puts an arrow between pins: before every I/O pin, and before the first
+ * input. Returns whether the line has pins now. */
+static bool net_pins(struct hal_session *const session, const struct hh_signal *const signal, const hal_pin_dir_t dir,
+                     bool before)
 {
     const struct hh_list *const pins = &hh_host()->pins.shown;
-    bool first = true;
+    bool arrow = dir != HAL_OUT;
     for (size_t i = 0; i < pins->count; i++) {
         const struct hh_pin *const pin = pins->items[i];
-        if (pin->signal != signal || (dir && (int)pin->dir != dir))
+        if (pin->signal != signal || pin->dir != dir)
             continue;
-        if (first && *arrow)
-            hal_print(session, " %s", arrow);
-        first = false;
+        if (before && arrow)
+            hal_print(session, dir == HAL_IO ? " <=>" : " =>");
         hal_print(session, " %s", hh_shown_name(pin));
+        before = true;
+        arrow = dir == HAL_IO;
+    }
+    return before;
+}
+
+static void net_all_pins(struct hal_session *const session, const struct hh_signal *const signal)
+{
+    const struct hh_list *const pins = &hh_host()->pins.shown;
+    for (size_t i = 0; i < pins->count; i++) {
+        const struct hh_pin *const pin = pins->items[i];
+        if (pin->signal == signal)
+            hal_print(session, " %s", hh_shown_name(pin));
     }
 }
 
@@ -116,11 +129,11 @@ static void save_nets(struct hal_session *const session, const bool arrows)
             continue;
         hal_print(session, "net %s", signal->names.name);
         if (arrows) {
-            net_pins(session, signal, HAL_OUT, "");
-            net_pins(session, signal, HAL_IO, signal->bidirs ? "<=>" : "");
-            net_pins(session, signal, HAL_IN, "=>");
+            bool before = net_pins(session, signal, HAL_OUT, false);
+            before = net_pins(session, signal, HAL_IO, before);
+            (void)net_pins(session, signal, HAL_IN, before);
         } else {
-            net_pins(session, signal, 0, "");
+            net_all_pins(session, signal);
         }
         hal_print(session, "\n");
     }

@@ -41,8 +41,8 @@ struct halhost_options {
     size_t memory_bytes; /* for hal_malloc(), 0 = 8 MiB */
     /* Text printed by components and by the host; a call is one message. It is called from the program's thread and
      * from a helper thread, never from a realtime thread. NULL = messages are dropped. */
-    void (*message)(void *context, enum halhost_stream stream, const char *text);
-    void *context;
+    void (*message)(const void *context, enum halhost_stream stream, const char *text);
+    const void *context;
     const struct halhost_builtin *builtins; /* besides "threads", which is always there */
     size_t builtin_count;
     const char *const *folders; /* where components are looked for, first match wins; NULL-terminated or NULL */

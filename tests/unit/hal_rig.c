@@ -107,7 +107,7 @@ static const struct halhost_builtin builtins[] = {
 
 /* ---- rig -------------------------------------------------------------------------------------------------------- */
 
-static void on_message(void *const context, const enum halhost_stream stream, const char *const text)
+static void on_message(const void *const context, const enum halhost_stream stream, const char *const text)
 {
     (void)context;
     (void)stream;

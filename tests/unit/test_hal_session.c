@@ -274,7 +274,7 @@ static void a_saved_configuration_can_be_restored(void **state)
                           "newsig lone u32  \n"
                           "# nets\n"
                           "net a probe.0.out => probe.1.in\n"
-                          "net b <=> probe.0.io probe.1.io\n"
+                          "net b probe.0.io <=> probe.1.io\n"
                           "# parameter values\n"
                           "setp g1          2.5\n"
                           "setp probe.0.gain         1.25\n"

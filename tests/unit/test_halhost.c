@@ -335,7 +335,7 @@ static void functions_are_added_at_their_position(void **state)
     };
     const int id = comp("a");
     for (int i = 0; i < 7; i++) {
-        char name[8];
+        char name[16];
         snprintf(name, sizeof name, "f%d", i);
         assert_int_equal(hal_export_funct(name, do_nothing, NULL, 0, 0, id), 0);
     }

@@ -67,14 +67,6 @@ static enum hal_wait wait_until(void *const context, const int64_t until_ns)
 
 /* ---- output ----------------------------------------------------------------------------------------------------- */
 
-static void on_message(void *const context, const enum halhost_stream stream, const char *const text)
-{
-    (void)context;
-    FILE *const file = stream == HALHOST_STDOUT ? stdout : stderr;
-    (void)fputs(text, file);
-    (void)fflush(file);
-}
-
 static void on_output(void *const context, const char *const text, const size_t length)
 {
     (void)context;
@@ -266,6 +258,15 @@ static void add_default_folders(struct arguments *const arguments, char own[PATH
     arguments->folders[arguments->folder_count] = NULL;
 }
 
+/* With --json, standard output is for JSON only. */
+static void on_message(const void *const context, const enum halhost_stream stream, const char *const text)
+{
+    const struct arguments *const arguments = context;
+    FILE *const file = stream == HALHOST_STDOUT && !arguments->json ? stdout : stderr;
+    (void)fputs(text, file);
+    (void)fflush(file);
+}
+
 /* ---- running ---------------------------------------------------------------------------------------------------- */
 
 static int run_text(struct hal_session *const session, const char *const name, const char *const text,
@@ -274,19 +275,36 @@ static int run_text(struct hal_session *const session, const char *const name, c
     return hal_session_run_text(session, name, text, strlen(text), diag);
 }
 
+/* Read one command with the lines that continue it into text; 0 = end of input. */
+static unsigned read_command(struct prompt *const prompt, char *const text, const size_t size)
+{
+    size_t used = 0;
+    unsigned lines = 0;
+    const char *line;
+    bool more = true;
+    while (more && (line = prompt_read(prompt))) {
+        const size_t length = strlen(line);
+        more = length > 0 && line[length - 1] == '\\';
+        lines++;
+        const int added = snprintf(text + used, size - used, "%s\n", line);
+        used += added > 0 && (size_t)added < size - used ? (size_t)added : size - used - 1;
+    }
+    return lines;
+}
+
 /* Commands from a person or a pipe. At a prompt an error ends nothing. */
 static int run_prompt(struct hal_session *const session, const bool keep_going)
 {
+    static char text[65536];
     struct prompt *const prompt = prompt_new(session);
-    if (!prompt)
-        return EXIT_HAL;
-    const char *line;
-    int status = 0;
-    for (unsigned number = 1; !status && !hal_session_ended(session) && (line = prompt_read(prompt)); number++) {
+    int status = prompt ? 0 : EXIT_HAL;
+    unsigned number = 1, lines;
+    while (!status && !hal_session_ended(session) && (lines = read_command(prompt, text, sizeof text))) {
         struct hm2_diag diag = {0};
         if (keep_going && pending_signal == SIGINT)
             pending_signal = signals_seen = 0;
-        const int err = hal_session_run_lines(session, "<stdin>", number, line, strlen(line), &diag);
+        const int err = hal_session_run_lines(session, "<stdin>", number, text, strlen(text), &diag);
+        number += lines;
         (void)fflush(stdout);
         if (err)
             fputs(diag.text, stderr);
@@ -349,6 +367,7 @@ static int run_host(const struct arguments *const arguments)
 {
     const struct halhost_options host = {
         .message = on_message,
+        .context = arguments,
         .folders = arguments->folders,
         .cpu = arguments->cpu,
         .no_realtime = arguments->no_realtime,
