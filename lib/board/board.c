@@ -67,16 +67,14 @@ static int ask(struct hm2_board *const board)
     const uint8_t *const request = hm2_plan_request(board->plan, &len);
     board->request_ns = link_now_ns(board->link);
     int err = link_send(board->link, request, len);
-    while (err >= 0) {
+    for (unsigned i = 0; i < BOARD_MAX_DATAGRAMS && err != HM2_ERR_TIMEOUT; i++) {
         err = link_recv(board->link, hm2_plan_reply_buffer(board->plan), hm2_plan_reply_capacity(board->plan),
                         board->request_ns + START_TRY_NS);
         if (err >= 0 && hm2_plan_judge(board->plan, (size_t)err) == HM2_REPLY_FRESH)
             return 0;
-        if (err == HM2_ERR_NOSPACE)
-            err = 0;
     }
     hm2_plan_give_up(board->plan);
-    return err;
+    return err < 0 ? err : HM2_ERR_MALFORMED;
 }
 
 /* One write, as set-up left it: no module has packed anything yet, so every value is at rest. */

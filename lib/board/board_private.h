@@ -29,7 +29,6 @@ struct board_points {
     hm2_bit_t *rtt_reset;
 };
 
-
 int board_points_bind(struct hm2_board *board, struct hm2_binder *binder, struct hm2_diag *diag);
 
 /* ---- exchanges outside the cycle: one request, one proven reply ----------------------------------------------------
@@ -42,6 +41,10 @@ struct board_exchange {
     uint8_t request[LBP16_MAX_REQUEST_BYTES];
     uint8_t reply[LBP16_MAX_REPLY_BYTES + 1u]; /* longer than a good reply, so that a long one is noticed */
 };
+
+/* Datagrams looked at while one reply is waited for: a flood of wrong ones cannot hold the thread beyond its deadline
+ * anyway, but a link whose clock stands still must not hold it for ever. */
+#define BOARD_MAX_DATAGRAMS 64u
 
 /* How long a set-up exchange may take: about one second in all. */
 #define BOARD_TRIES     5u
@@ -162,6 +165,8 @@ struct hm2_board {
 /* Account for a cycle (hal-interface 3.5). Returns with io_error set when the level has reached its limit. */
 void board_cycle_failed(struct hm2_board *board, bool raise_level);
 void board_cycle_good(struct hm2_board *board);
+/* Has the level reached its limit? */
+bool board_level_exceeded(const struct hm2_board *board);
 /* Time after the request at which a reply is given up (hal-interface 3.4). */
 int64_t board_read_limit_ns(int32_t setting, int64_t period_ns);
 

@@ -6,9 +6,6 @@
 #include "../module/watchdog.h"
 #include "board_private.h"
 
-/* Datagrams looked at in one cycle: a flood of wrong ones cannot hold the thread beyond its deadline anyway, but a link
- * whose clock stands still must not hold it for ever. */
-#define MAX_DATAGRAMS     64u
 #define DEFAULT_PERIOD_NS 1000000
 /* A module that changes its set-up in every cycle must not hold the return of a card up for ever. */
 #define MAX_RESTORE_WRITES 256u
@@ -42,7 +39,7 @@ static void send_request(struct hm2_board *const board)
     const bool identity = board->recovery == BOARD_ASKS_IDENTITY;
     size_t len = board->identity.builder.used;
     const uint8_t *const bytes = identity ? board_recovery_request(board) : hm2_plan_request(board->plan, &len);
-    board->request_ns = link_now_ns(board->link);
+    board->notices.now_ns = board->request_ns = link_now_ns(board->link);
     board->sent = link_send(board->link, bytes, len) == 0;
     board->outstanding = true;
 }
@@ -51,16 +48,14 @@ void hm2_board_request(struct hm2_board *const board, const int64_t period_ns)
 {
     if (is_stopped(board) || board->outstanding)
         return;
-    const struct board_points *const p = board->points;
     /* A person has cleared io_error (hal-interface 3.5). */
-    if (*p->error_level >= (*p->error_limit < 1 ? 1 : *p->error_limit)) {
-        *p->error_level = 0;
+    if (board_level_exceeded(board)) {
+        *board->points->error_level = 0;
         /* While nothing was sent the card may have become another. */
         if (board->recovery == BOARD_RESTORES)
             board->recovery = BOARD_ASKS_IDENTITY;
     }
     board->period_ns = period_ns > 0 ? period_ns : DEFAULT_PERIOD_NS;
-    board->notices.now_ns = link_now_ns(board->link);
     send_request(board);
 }
 
@@ -106,7 +101,7 @@ static bool receive(struct hm2_board *const board)
     uint8_t *const buffer = identity ? board->identity.reply : hm2_plan_reply_buffer(board->plan);
     const size_t capacity = identity ? sizeof board->identity.reply : hm2_plan_reply_capacity(board->plan);
     const int64_t deadline_ns = board->request_ns + board_read_limit_ns(*board->points->read_timeout, board->period_ns);
-    for (unsigned i = 0; i < MAX_DATAGRAMS; i++) {
+    for (unsigned i = 0; i < BOARD_MAX_DATAGRAMS; i++) {
         const int len = link_recv(board->link, buffer, capacity, deadline_ns);
         if (len == HM2_ERR_TIMEOUT)
             return false;

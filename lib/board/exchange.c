@@ -34,19 +34,22 @@ bool board_exchange_matches(const struct board_exchange *const exchange, const s
     return len == exchange->builder.reply_bytes && hm2_get_le32(exchange->reply + exchange->echo_at) == exchange->nonce;
 }
 
+/* A host that refuses (ICMP "port unreachable") is reported as an error at once; the card, or its simulation, may still
+ * be starting, so the time of the try is waited out all the same. */
 static int try_once(struct hm2_board *const board, struct board_exchange *const exchange, const int64_t try_ns)
 {
     const int64_t deadline_ns = link_now_ns(board->link) + try_ns;
-    const int sent = link_send(board->link, exchange->request, exchange->builder.used);
-    if (sent < 0)
-        return sent;
-    for (;;) {
+    int err = link_send(board->link, exchange->request, exchange->builder.used);
+    for (unsigned i = 0; i < BOARD_MAX_DATAGRAMS; i++) {
         const int len = link_recv(board->link, exchange->reply, sizeof exchange->reply, deadline_ns);
         if (len >= 0 && board_exchange_matches(exchange, (size_t)len))
             return 0;
-        if (len == HM2_ERR_TIMEOUT || len == HM2_ERR_IO)
-            return len;
+        if (len == HM2_ERR_TIMEOUT)
+            return err < 0 ? err : len;
+        if (len == HM2_ERR_IO)
+            err = len;
     }
+    return err < 0 ? err : HM2_ERR_MALFORMED;
 }
 
 int board_exchange_run(struct hm2_board *const board, struct board_exchange *const exchange, const unsigned tries,

@@ -263,6 +263,14 @@ static void a_stale_set_up_reply_is_not_taken_for_a_fresh_one(void **state)
     assert_int_equal(value, 2);
 }
 
+static void a_host_that_refuses_at_first_is_tried_again(void **state)
+{
+    struct fixture *const f = *state;
+    f->card.refuse_send = true;
+    assert_int_equal(identify(f), 0);
+    assert_string_equal(hm2_board_card_name(f->board), "7I96S");
+}
+
 static void a_dead_card_is_given_up_after_about_a_second(void **state)
 {
     struct fixture *const f = *state;
@@ -1123,6 +1131,7 @@ int main(void)
         TEST(a_card_is_known_by_its_name_and_idrom),
         TEST(lost_and_late_set_up_replies_are_asked_for_again),
         TEST(a_stale_set_up_reply_is_not_taken_for_a_fresh_one),
+        TEST(a_host_that_refuses_at_first_is_tried_again),
         TEST(a_dead_card_is_given_up_after_about_a_second),
         TEST(firmware_of_another_card_is_refused_with_every_reason),
         TEST(an_unknown_card_gets_its_name_from_its_first_characters),
