@@ -63,7 +63,7 @@ static void pack_filter(struct encoder_module *const ctx, const struct hm2_modul
     hm2_section_set(&ctx->filter_rate, 0, word);
 }
 
-static void pack_divisor(struct encoder_module *const ctx)
+static void pack_divisor(struct encoder_module *const ctx, const unsigned encoders)
 {
     const bool hires = *ctx->hires_timestamp;
     if (hires == ctx->hires_seen)
@@ -72,6 +72,8 @@ static void pack_divisor(struct encoder_module *const ctx)
     hm2_section_set(&ctx->divisor, 0, encoder_divisor(ctx->clock_hz, hires ? STAMP_HIRES_HZ : STAMP_HZ, &ctx->tick_s));
     /* Stamps of both tick lengths cannot be compared: velocities begin anew when the card counts with the new one. */
     ctx->timebase_known = false;
+    for (unsigned i = 0; i < encoders; i++)
+        ctx->encoder[i].motion = ENCODER_STOPPED;
 }
 
 static uint32_t quad_bits(struct encoder *const enc)
@@ -126,7 +128,7 @@ void encoder_pack(struct hm2_module *const module, const struct hm2_cycle *const
     struct encoder_module *const ctx = module->context;
     if (!ctx)
         return;
-    pack_divisor(ctx);
+    pack_divisor(ctx, module->instances);
     pack_filter(ctx, module);
     hm2_timer_pack(&ctx->timer, module);
     const unsigned look = ctx->look;
@@ -178,7 +180,7 @@ int encoder_add_settings(struct hm2_module *const module, struct hm2_setup *cons
     if (err)
         return err;
     ctx->hires_seen = true; /* so that the first call computes the normal divisor */
-    pack_divisor(ctx);
+    pack_divisor(ctx, module->instances);
     pack_filter(ctx, module);
     for (unsigned i = 0; i < module->instances; i++) {
         ctx->encoder[i].word = ENCODER_FILTER; /* the default of the points */

@@ -536,6 +536,67 @@ static void a_word_that_an_old_write_undid_is_sent_again(void **state)
     rig_free(card.rig);
 }
 
+static void an_old_arming_write_that_comes_late_is_no_index(void **state)
+{
+    (void)state;
+    struct encoder_card card = open_7i96s();
+    cycles(&card, 2);
+    set(&card, "index-enable", 1);
+    card.rig->lose_writes = true;
+    cycles(&card, 1);
+    card.control = 0x0840; /* of an earlier search, whose event was reported then */
+    cycles(&card, 1);
+    assert_true(get(&card, "index-enable") == 1.0);
+    card.rig->lose_writes = false;
+    cycles(&card, 3);
+    assert_true(get(&card, "index-enable") == 1.0);
+    assert_int_equal(card.control, 0x0850);
+    rig_free(card.rig);
+}
+
+static void a_search_is_armed_only_after_the_card_was_seen_disarmed(void **state)
+{
+    (void)state;
+    struct encoder_card card = open_7i96s();
+    cycles(&card, 2);
+    set(&card, "index-enable", 1);
+    cycles(&card, 1);
+    encoder_card_index(&card);
+    card.rig->lose_writes = true; /* the word that disarms */
+    cycles(&card, 1);
+    assert_true(get(&card, "index-enable") == 0.0);
+    set(&card, "index-enable", 1);
+    card.rig->lose_writes = false;
+    cycles(&card, 1);
+    assert_int_equal(card.control, 0x0800);
+    cycles(&card, 1);
+    assert_int_equal(card.control, 0x0850);
+    /* Given up and begun again without a reply between. */
+    set(&card, "index-enable", 0);
+    rig_write_out(card.rig);
+    encoder_card_take(&card);
+    set(&card, "index-enable", 1);
+    rig_write_out(card.rig);
+    encoder_card_take(&card);
+    assert_int_equal(card.control, 0x0800);
+    cycles(&card, 1);
+    assert_int_equal(card.control, 0x0850);
+    rig_free(card.rig);
+}
+
+static void the_first_cycle_takes_the_parameters_of_all_encoders(void **state)
+{
+    (void)state;
+    struct encoder_card card = encoder_card_open(rig_image_7i93(), "", &hm2_encoder_type);
+    rig_set(card.rig, "encoder.06.counter-mode", 1);
+    cycles(&card, 1);
+    assert_int_equal(rig_written(card.rig, CONTROL + 24), 0x0C00);
+    rig_set(card.rig, "encoder.06.counter-mode", 0);
+    cycles(&card, 8);
+    assert_int_equal(rig_written(card.rig, CONTROL + 24), 0x0800);
+    rig_free(card.rig);
+}
+
 /* Losses in both directions, index pulses and searches at random: whatever the driver calls an index was one, after
  * the search began and not a pulse earlier than the last. */
 static void no_false_index_with_losses(void **state)
@@ -611,6 +672,24 @@ static void old_quadrature_errors_are_not_reported(void **state)
     }
 }
 
+static void clearing_old_errors_survives_lost_writes(void **state)
+{
+    (void)state;
+    struct encoder_card card = open_7i96s(); /* where writing bit 15 as 1 sets it */
+    cycles(&card, 2);
+    set(&card, "quad-error-enable", 1);
+    cycles(&card, 1);
+    assert_int_equal(card.control & 0x8000, 0x8000);
+    card.rig->lose_writes = true;
+    cycles(&card, 4);
+    assert_true(get(&card, "quad-error") == 0.0);
+    card.rig->lose_writes = false;
+    cycles(&card, 4);
+    assert_int_equal(card.control & 0x8000, 0);
+    assert_int_equal(noticed(&card, HM2_NOTICE_QUAD_ERROR), 0);
+    rig_free(card.rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -642,6 +721,10 @@ int main(void)
         cmocka_unit_test(a_word_that_an_old_write_undid_is_sent_again),
         cmocka_unit_test(no_false_index_with_losses),
         cmocka_unit_test(old_quadrature_errors_are_not_reported),
+        cmocka_unit_test(an_old_arming_write_that_comes_late_is_no_index),
+        cmocka_unit_test(a_search_is_armed_only_after_the_card_was_seen_disarmed),
+        cmocka_unit_test(the_first_cycle_takes_the_parameters_of_all_encoders),
+        cmocka_unit_test(clearing_old_errors_survives_lost_writes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

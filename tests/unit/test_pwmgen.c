@@ -71,6 +71,7 @@ static void the_finest_resolution_that_is_fast_enough_is_taken(void **state)
         assert_int_equal(rate.frequency_hz, cases[i].used_hz);
         assert_int_equal(rate.clamped, cases[i].clamped);
     }
+    assert_int_equal(pwmgen_pwm_rate(400000000, 1).dds, 1); /* 0 would stand still */
     const struct pwmgen_rate fast = pwmgen_pdm_rate(CLOCK_HIGH_HZ, UINT32_MAX);
     assert_int_equal(fast.dds, 65535);
     assert_int_equal(fast.frequency_hz, 199996948);

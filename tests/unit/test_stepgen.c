@@ -146,6 +146,9 @@ static void a_changed_parameter_is_seen_within_as_many_cycles_as_there_are_gener
 {
     (void)state;
     struct bench bench = bench_open(rig_image_7i96s(), "");
+    rig_set(bench.rig, "stepgen.04.steplen", 2000);
+    run(&bench); /* the first cycle sees all */
+    assert_int_equal(rig_written(bench.rig, STEPLEN + 16), 200);
     run_many(&bench, 7);
     for (unsigned i = 0; i < GENERATORS; i++) {
         char name[64];
@@ -592,6 +595,33 @@ static void position_mode_is_the_documented_algorithm(void **state)
     }
 }
 
+static void position_mode_takes_over_from_velocity_mode_without_a_jump(void **state)
+{
+    (void)state;
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
+    set_fast(&bench);
+    set(&bench, "position-scale", 1000);
+    set(&bench, "maxaccel", 1000);
+    set(&bench, "control-type", 1);
+    set(&bench, "velocity-cmd", 10);
+    set(&bench, "enable", 1);
+    double command = 0.0;
+    for (unsigned i = 0; i < 1000; i++) {
+        run(&bench);
+        command = get(&bench, "position-fb");
+        set(&bench, "position-cmd", command);
+    }
+    run(&bench);
+    set(&bench, "control-type", 0);
+    for (unsigned i = 0; i < 50; i++) {
+        set(&bench, "position-cmd", command += 0.01);
+        run(&bench);
+        assert_near(get(&bench, "dbg_ff_vel"), 10, 1);
+        assert_near(get(&bench, "velocity-fb"), 10, 10);
+    }
+    rig_free(bench.rig);
+}
+
 static void a_command_beyond_the_limit_is_reported(void **state)
 {
     (void)state;
@@ -711,6 +741,7 @@ int main(void)
         cmocka_unit_test(a_bite_stops_the_generators_and_they_start_from_rest),
         cmocka_unit_test(hostile_pins_never_leave_the_limits),
         cmocka_unit_test(a_command_that_is_no_number_holds_the_position),
+        cmocka_unit_test(position_mode_takes_over_from_velocity_mode_without_a_jump),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -100,12 +100,37 @@ static void a_new_search_right_after_an_index_is_armed_anew(void **state)
     assert_true(rig_get(rig, "stepgen.00.index-enable") == 0.0);
     rig_set(rig, "stepgen.00.index-enable", 1); /* before the next write */
     rig_write_out(rig);
+    bool armed = false;
     for (unsigned i = 0; i < 4; i++) {
-        put_mode(rig, 0, 0);
+        if (rig_wrote(rig, MODE))
+            armed = rig_written(rig, MODE) & 0x10;
+        put_mode(rig, armed ? 0 : 0x10, 0); /* what has fired stays so until it is written */
         rig_cycle(rig);
         assert_true(rig_get(rig, "stepgen.00.index-enable") == 1.0);
     }
+    assert_true(armed);
+    rig_free(rig);
+}
+
+static void a_search_is_armed_only_after_the_word_without_it_is_confirmed(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = open_rig();
+    rig_cycle(rig);
+    rig_set(rig, "stepgen.00.index-enable", 1);
+    rig_cycle(rig);
+    put_mode(rig, 0x10, 0);
+    rig->lose_writes = true;
+    rig_cycle(rig);
+    assert_true(rig_get(rig, "stepgen.00.index-enable") == 0.0);
+    rig_set(rig, "stepgen.00.index-enable", 1);
+    rig->lose_writes = false;
+    rig_cycle(rig);
+    assert_int_equal(rig_written(rig, MODE), 0);
+    put_mode(rig, 0, 0);
+    rig_cycle(rig);
     assert_int_equal(rig_written(rig, MODE), 0x10);
+    assert_true(rig_get(rig, "stepgen.00.index-enable") == 1.0);
     rig_free(rig);
 }
 
@@ -116,6 +141,7 @@ int main(void)
         cmocka_unit_test(a_probe_latches_without_zeroing),
         cmocka_unit_test(a_lost_arming_write_is_no_index),
         cmocka_unit_test(a_new_search_right_after_an_index_is_armed_anew),
+        cmocka_unit_test(a_search_is_armed_only_after_the_word_without_it_is_confirmed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
