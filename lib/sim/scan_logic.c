@@ -87,7 +87,8 @@ static void mpg_edge(struct scanner *const s)
     if (now == s->mpg_seen)
         return;
     for (unsigned i = 0; i < SCAN_MPGS; i++) {
-        const int step = mpg_step(s->mpg_seen >> 2 * i & 3u, now >> 2 * i & 3u, s->mpg_mode >> i & 1u);
+        const int step =
+            mpg_step((unsigned)s->mpg_seen >> 2 * i & 3u, (unsigned)now >> 2 * i & 3u, (unsigned)s->mpg_mode >> i & 1u);
         s->mpg[i] = (uint8_t)(s->mpg[i] + (unsigned)step);
     }
     s->mpg_seen = now;
