@@ -439,6 +439,13 @@ static void a_disabled_generator_stands_still(void **state)
         assert_int_equal(rate(&bench), 0);
         assert_true(get(&bench, "velocity-fb") == 0.0);
     }
+    /* A command that moved meanwhile is no velocity when it is enabled. */
+    set(&bench, "control-type", 0);
+    set(&bench, "position-cmd", 200);
+    run(&bench);
+    set(&bench, "enable", 1);
+    run(&bench);
+    assert_true(get(&bench, "dbg_ff_vel") == 0.0);
     rig_free(bench.rig);
 }
 
