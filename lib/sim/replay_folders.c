@@ -215,12 +215,15 @@ const struct replay_kind replay_kinds[] = {
      .firmware = "SVST4_4_48",
      .profile = "7i93",
      .vectors = ioport_vectors,
-     .before_event = ioport_stimulus},
+     .before_event = ioport_stimulus,
+     .extra = replay_pin_truth},
     {.folder = "hm2dpll",
      .firmware = "7I76E_51",
      .profile = "7i93",
      .registers = hm2dpll_registers,
      .vectors = hm2dpll_vectors},
+    {.folder = "idrom", .extra = replay_idrom, .no_events = true},
+    {.folder = "lbp16", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_lbp16, .no_events = true},
 };
 
 const unsigned replay_kind_count = sizeof(replay_kinds) / sizeof(replay_kinds[0]);

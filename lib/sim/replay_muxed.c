@@ -144,6 +144,8 @@ static void make_counts(struct maker *const m, const unsigned encoder, const uin
     const int64_t ticks = (m->control[encoder] & 0x800u) ? LONG_TICKS : FILTER_TICKS;
     const int64_t last = counted - (ticks + 1) * m->tick;
     const int64_t room = edges > 1 ? (last - from) / (edges - 1) : 0;
+    if (edges > 1 && room < 1)
+        return; /* so many edges do not fit: the count will differ */
     const int64_t step = room < EDGE_CLK ? room : EDGE_CLK;
     for (int n = 0; n < edges; n++)
         make_edge(m, encoder, last - (edges - 1 - n) * step, delta > 0);

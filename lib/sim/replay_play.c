@@ -9,6 +9,8 @@
 
 #include "sim_card.h"
 
+#define PIECE_CLK 65536
+
 void replay_differs(struct replay_run *const run, const char *const format, ...)
 {
     if (run->difference[0])
@@ -116,6 +118,8 @@ static void on_edge(void *const context, const int64_t clk, const unsigned ps, c
                     const enum sim_level level)
 {
     struct replay_run *const run = context;
+    if (++run->edges_seen > REPLAY_MAX_EVENTS)
+        replay_differs(run, "clk %lld: more than %u edges", (long long)clk, REPLAY_MAX_EVENTS);
     for (unsigned i = 0; i < run->watch_count; i++) {
         struct replay_watch *const watch = &run->watches[i];
         if (watch->number != (int)number)
@@ -396,6 +400,13 @@ static unsigned phase_of(const struct replay_run *const run, const struct replay
     }
 }
 
+/* In pieces, so that a test that has failed does not run to its end. */
+static void advance(struct replay_run *const run, const int64_t clk)
+{
+    for (int64_t now = sim_card_clock(run->card); now < clk && !run->difference[0]; now = sim_card_clock(run->card))
+        sim_card_advance(run->card, now + PIECE_CLK < clk ? now + PIECE_CLK : clk);
+}
+
 static int play_event(struct replay_run *const run, const struct replay_event *const event, struct hm2_diag *const diag)
 {
     const int err = run->kind->before_event ? run->kind->before_event(run, event) : 0;
@@ -431,7 +442,10 @@ static int play_events(struct replay_run *const run, struct hm2_diag *const diag
 {
     const struct replay_event *const events = run->trace->events;
     const size_t end = run->test->first + run->test->count;
-    for (size_t i = run->test->first; i < end && !run->difference[0];) {
+    for (size_t i = run->test->first; i < end;) {
+        advance(run, replay_clk(run, events[i].at) - 1);
+        if (run->difference[0])
+            return 0;
         size_t next = i + 1;
         while (next < end && events[next].at == events[i].at)
             next++;

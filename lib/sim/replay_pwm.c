@@ -12,7 +12,7 @@
 #include "replay_trace.h"
 #include "sim_card.h"
 
-#define MAX_EDGES      (1u << 20)
+#define MAX_EDGES      (1u << 18)
 #define MAX_LISTED     8u
 #define WINDOW_HCLK    (6 * 65536)
 #define MAX_HCLK       (1 << 28)
@@ -218,30 +218,52 @@ static int64_t high_time(const struct output *const o, const size_t rise)
     return rise + 1 < o->count ? o->edges[rise + 1].hclk - o->edges[rise].hclk : 0;
 }
 
-/* Rising edge i starts a stretch of whole periods with just the expected values. */
-static bool stretch_fits(const struct output *const o, size_t i, const struct expected *const e)
+/* Periods lo..hi of an output, one behind the other, with how often each expected value is among them. */
+struct stretch {
+    int64_t total, high_sum;
+    unsigned periods[MAX_LISTED + 1], highs[MAX_LISTED + 1];
+};
+
+static void stretch_add(struct stretch *const s, const struct expected *const e, const int64_t period,
+                        const int64_t high, const int sign)
 {
-    unsigned periods_seen = 0, highs_seen = 0;
-    const unsigned all_periods = (1u << e->period_count) - 1, all_highs = (1u << e->high_count) - 1;
-    int64_t total = 0, high_sum = 0;
-    for (; i + 2 < o->count; i += 2) {
-        const int64_t high = high_time(o, i);
-        const int64_t period = o->edges[i + 2].hclk - o->edges[i].hclk;
-        const unsigned p = position_in(e->periods, e->period_count, period);
-        const unsigned h = position_in(e->highs, e->high_count, high);
-        if (p == e->period_count || h == e->high_count)
+    s->total += sign * period;
+    s->high_sum += sign * high;
+    s->periods[position_in(e->periods, e->period_count, period)] += (unsigned)sign;
+    s->highs[position_in(e->highs, e->high_count, high)] += (unsigned)sign;
+}
+
+/* Every expected value is there, `also` counted in: the window may have ended with a pulse whose period is not whole.
+ */
+static bool stretch_complete(const struct stretch *const s, const struct expected *const e, const int64_t also)
+{
+    const unsigned extra = position_in(e->highs, e->high_count, also);
+    for (unsigned i = 0; i < e->period_count; i++)
+        if (!s->periods[i])
             return false;
-        periods_seen |= 1u << p;
-        highs_seen |= 1u << h;
-        total += period;
-        high_sum += high;
-        /* The window may have ended with a pulse whose period is not whole. */
-        const unsigned last = position_in(e->highs, e->high_count, high_time(o, i + 2));
-        const bool complete = periods_seen == all_periods && (highs_seen | (1u << last & all_highs)) == all_highs;
-        if (complete && (e->total ? total == e->total && high_sum == e->high_sum : true))
+    for (unsigned i = 0; i < e->high_count; i++)
+        if (!s->highs[i] && i != extra)
+            return false;
+    return !e->total || (s->total == e->total && s->high_sum == e->high_sum);
+}
+
+/* Somewhere there is a stretch of whole periods with just the expected values. */
+static bool stretch_fits(const struct output *const o, const struct expected *const e)
+{
+    const size_t first = o->count && !o->edges[0].level ? 1 : 0;
+    struct stretch s = {0};
+    for (size_t lo = first, hi = first; hi + 2 < o->count; hi += 2) {
+        const int64_t period = o->edges[hi + 2].hclk - o->edges[hi].hclk;
+        stretch_add(&s, e, period, high_time(o, hi), 1);
+        if (s.periods[e->period_count] || s.highs[e->high_count]) {
+            s = (struct stretch){0};
+            lo = hi + 2;
+            continue;
+        }
+        for (; e->total && s.total > e->total; lo += 2)
+            stretch_add(&s, e, o->edges[lo + 2].hclk - o->edges[lo].hclk, high_time(o, lo), -1);
+        if (stretch_complete(&s, e, high_time(o, hi + 2)))
             return true;
-        if (e->total && total >= e->total)
-            return false;
     }
     return false;
 }
@@ -263,10 +285,7 @@ static bool output_fits(const struct measure *const m, const struct output *cons
         return false;
     if (e->period_count == 0)
         return high_time_seen(o, e);
-    for (size_t i = 0; i < o->count; i++)
-        if (o->edges[i].level && stretch_fits(o, i, e))
-            return true;
-    return false;
+    return stretch_fits(o, e);
 }
 
 static void describe(const struct measure *const m, const char name, const struct output *const o,

@@ -77,8 +77,8 @@ static int parse_event(const struct replay_csv *const csv, const struct event_co
                             csv->line, kind, event_kinds);
     event->kind = kind[0];
     if (replay_decimal(csv->field[columns->at], REPLAY_MAX_TIME, &event->at))
-        return hm2_diag_add(diag, HM2_ERR_MALFORMED, "%s line %u: time \"%.20s\" is not a number of 0..%lld.",
-                            csv->file, csv->line, csv->field[columns->at], REPLAY_MAX_TIME);
+        return hm2_diag_add(diag, HM2_ERR_MALFORMED, "%s line %u: time \"%.20s\" is not a number of 0..%d.", csv->file,
+                            csv->line, csv->field[columns->at], REPLAY_MAX_TIME);
     return 0;
 }
 

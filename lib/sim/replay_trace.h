@@ -8,7 +8,7 @@
 
 #define REPLAY_MAX_TESTS  10000u
 #define REPLAY_MAX_EVENTS 4000000u
-#define REPLAY_MAX_TIME   1000000000ll /* clocks or nanoseconds */
+#define REPLAY_MAX_TIME   100000000 /* clocks or nanoseconds */
 
 struct replay_event {
     int64_t at; /* clock, or nanosecond when the trace has them */
@@ -128,6 +128,7 @@ struct replay_run {
     const struct replay_trace *trace;
     const struct replay_test *test;
     struct sim_card *card;
+    size_t edges_seen;
     int64_t first_edge; /* time from which edges are compared */
     struct replay_watch watches[REPLAY_MAX_WATCHES];
     unsigned watch_count;

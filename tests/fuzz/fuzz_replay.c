@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* Trace tables from anywhere: tests.csv, a zero byte, events.csv; then the test is played. */
+/* Trace folders from anywhere: the first byte chooses the kind, the rest is its files, with zero bytes between. What
+ * can be read is played. */
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -14,18 +15,32 @@ struct input {
     size_t size;
 };
 
+/* Number of a file among those of its folder. */
+static unsigned number_of(const char *const name)
+{
+    static const char *const first[] = {"tests.csv", "index.csv", "exchanges.csv"};
+    for (size_t i = 0; i < sizeof(first) / sizeof(first[0]); i++)
+        if (strcmp(name, first[i]) == 0)
+            return 0;
+    return strcmp(name, "measure.csv") == 0 || strcmp(name, "truth.csv") == 0 ? 2 : 1;
+}
+
 static int load(void *const context, const char *const name, char **const text, size_t *const len,
                 struct hm2_diag *const diag)
 {
     (void)diag;
     const struct input *const input = context;
-    const uint8_t *const cut = memchr(input->data, 0, input->size);
-    const size_t first = cut ? (size_t)(cut - input->data) : input->size;
-    const bool events = strcmp(name, "tests.csv") != 0;
-    if (events && (strcmp(name, "events.csv") != 0 || !cut))
-        return HM2_ERR_NOTFOUND;
-    const uint8_t *const from = events ? cut + 1 : input->data;
-    *len = events ? input->size - first - 1 : first;
+    const uint8_t *from = input->data;
+    size_t left = input->size;
+    for (unsigned number = number_of(name); number > 0; number--) {
+        const uint8_t *const cut = left ? memchr(from, 0, left) : NULL;
+        if (!cut)
+            return HM2_ERR_NOTFOUND;
+        left -= (size_t)(cut - from) + 1;
+        from = cut + 1;
+    }
+    const uint8_t *const end = left ? memchr(from, 0, left) : NULL;
+    *len = end ? (size_t)(end - from) : left;
     *text = malloc(*len + 1);
     if (!*text)
         return HM2_ERR_NOMEM;
@@ -34,13 +49,23 @@ static int load(void *const context, const char *const name, char **const text, 
     return 0;
 }
 
+static bool list(void *const context, const size_t index, char *const name, const size_t size)
+{
+    (void)context;
+    if (index > 0 || size < 6)
+        return false;
+    memcpy(name, "a.hex", 6);
+    return true;
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *const data, const size_t size)
 {
-    static const char *const kinds[] = {"encoder", "pwmgen", "stepgen", "watchdog", "ioport", "hm2dpll"};
+    static const char *const kinds[] = {"encoder", "encoder_muxed", "pwmgen", "stepgen", "watchdog",
+                                        "ioport",  "hm2dpll",       "idrom",  "lbp16"};
     if (size < 1)
         return 0;
     struct input input = {.data = data + 1, .size = size - 1};
-    const struct replay_files files = {.load = load, .context = &input};
+    const struct replay_files files = {.load = load, .list = list, .context = &input};
     const struct replay_options options = {0};
     struct replay_totals totals = {0};
     struct hm2_diag diag;

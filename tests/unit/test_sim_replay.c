@@ -5,6 +5,7 @@
 #include <limits.h>
 
 #include "replay_trace.h"
+#include "trace_folder.h"
 
 /* ---- tables
  * ---------------------------------------------------------------------------------------------------------- */
@@ -249,6 +250,247 @@ static void an_unknown_folder_names_the_known_ones(void **state)
     assert_non_null(strstr(diag.text, "tests.csv"));
 }
 
+/* ---- differences are found
+ * ------------------------------------------------------------------------------------------------ */
+
+struct memory_file {
+    const char *name, *text;
+};
+
+struct memory_folder {
+    const struct memory_file *files;
+    char first_difference[256];
+};
+
+static int load_memory(void *const context, const char *const name, char **const text, size_t *const len,
+                       struct hm2_diag *const diag)
+{
+    (void)diag;
+    const struct memory_folder *const folder = context;
+    for (const struct memory_file *f = folder->files; f->name; f++) {
+        if (strcmp(f->name, name) != 0)
+            continue;
+        *len = strlen(f->text);
+        *text = malloc(*len + 1);
+        assert_non_null(*text);
+        memcpy(*text, f->text, *len + 1);
+        return 0;
+    }
+    return HM2_ERR_NOTFOUND;
+}
+
+static bool list_memory(void *const context, const size_t index, char *const name, const size_t size)
+{
+    const struct memory_folder *const folder = context;
+    size_t count = 0;
+    while (folder->files[count].name)
+        count++;
+    if (index >= count)
+        return false;
+    snprintf(name, size, "%s", folder->files[index].name);
+    return true;
+}
+
+static void keep_difference(void *const context, const char *const test, const bool passed,
+                            const char *const difference)
+{
+    struct memory_folder *const folder = context;
+    (void)test;
+    if (!passed && !folder->first_difference[0])
+        snprintf(folder->first_difference, sizeof(folder->first_difference), "%s", difference);
+}
+
+static struct replay_totals replay_memory(const char *const kind, struct memory_folder *const folder)
+{
+    const struct replay_files files = {.load = load_memory, .list = list_memory, .context = folder};
+    const struct replay_options options = {.on_result = keep_difference, .context = folder};
+    struct replay_totals totals = {0};
+    struct hm2_diag diag = {0};
+    if (replay_folder(kind, &files, &options, &totals, &diag))
+        fail_msg("%s", diag.text);
+    return totals;
+}
+
+/* One test of a kind with these events: NULL when it passes, else it fails with this difference. */
+static void check_events(const char *const kind, const char *const header, const char *const events,
+                         const char *const difference)
+{
+    char text[1000];
+    snprintf(text, sizeof(text), "%s\n%s", header, events);
+    const struct memory_file files[] = {{"tests.csv", "test,description\nt,\n"}, {"events.csv", text}, {NULL, NULL}};
+    struct memory_folder folder = {.files = files};
+    const struct replay_totals totals = replay_memory(kind, &folder);
+    assert_int_equal(totals.passed + totals.failed, 1);
+    if (difference && !strstr(folder.first_difference, difference))
+        fail_msg("expected \"%s\", got \"%s\"", difference, folder.first_difference);
+    if (!difference && totals.failed)
+        fail_msg("%s", folder.first_difference);
+}
+
+#define CLK_EVENTS "test,clk,ev,name,value"
+#define NS_EVENTS  "test,ns,ev,name,value"
+
+static void a_wrong_value_or_mask_of_a_read_is_found(void **state)
+{
+    (void)state;
+    check_events("encoder", CLK_EVENTS, "t,30,R,control,00000004/00003000\n", NULL);
+    check_events("encoder", CLK_EVENTS, "t,30,R,control,00000005/00003000\n",
+                 "clk 30: control expected 00000005/00003000 (line 2), got 00000004/00003000");
+    check_events("encoder", CLK_EVENTS, "t,30,R,control,00000004\n", "clk 30: control expected 00000004 (line 2)");
+    check_events("encoder", CLK_EVENTS, "t,30,R,control7,00000004/00003000\nt,31,R,0x311C,00000004/00003000\n", NULL);
+    check_events("encoder", CLK_EVENTS, "t,30,R,control8,00000000/FFFFFFFF\n", NULL);
+}
+
+static void missing_extra_and_mistimed_edges_are_found(void **state)
+{
+    (void)state;
+    const char *const start = "t,95,E,A,Z\nt,95,E,A,0\nt,125,W,pwmrate,0000FFFF\nt,155,W,mode,00000000\n"
+                              "t,185,W,value,00640000\n";
+    static const struct {
+        const char *edges, *difference;
+    } rows[] = {
+        {"t,202,E,A,1\nt,657,E,A,0\nt,705,R,enable,00000000\n", NULL},
+        {"t,202,E,A,1\nt,705,R,enable,00000000\n", "ns 657: A expected no further edge, got 0"},
+        {"t,202,E,A,1\nt,652,E,A,0\nt,705,R,enable,00000000\n", "ns 657: A expected 0 at 652 (line 8), got 0"},
+        {"t,197,E,A,1\nt,657,E,A,0\n", "ns 202: A expected 1 at 197 (line 7), got 1"},
+        {"t,202,E,A,1\nt,400,E,A,0\nt,410,E,A,1\nt,657,E,A,0\n", "A expected 0 at 400"},
+        {"t,202,E,A,1\nt,657,E,A,0\nt,690,E,A,1\nt,705,R,enable,00000000\n",
+         "ns 690: A expected 1 (line 9), got no edge up to 705"},
+    };
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        char events[600];
+        snprintf(events, sizeof(events), "%s%s", start, rows[i].edges);
+        check_events("pwmgen", NS_EVENTS, events, rows[i].difference);
+    }
+    check_events("pwmgen", NS_EVENTS, "t,95,E,A,1\nt,125,W,pwmrate,0000FFFF\n", "ns 95: A expected 1, got 0");
+}
+
+static void a_wrong_level_in_a_vector_is_found(void **state)
+{
+    (void)state;
+    check_events("ioport", CLK_EVENTS, "t,6,N,leds,1111\nt,9,W,led,80000000\nt,9,N,leds,1110\n", NULL);
+    check_events("ioport", CLK_EVENTS, "t,6,N,leds,1111\nt,9,W,led,80000000\nt,9,N,leds,1100\n",
+                 "clk 9: leds[2] expected 0 (line 4), got 1");
+    check_events("ioport", CLK_EVENTS, "t,6,W,ddr0,00000002\nt,6,I,pins,H0HH\n", NULL);
+    check_events("ioport", CLK_EVENTS, "t,6,W,ddr0,00000002\nt,6,I,pins,HHHH\n", "clk 6: pins[1] expected H");
+}
+
+static void a_test_without_events_fails(void **state)
+{
+    (void)state;
+    check_events("encoder", CLK_EVENTS, "", "no events of this test");
+}
+
+#define MEASURE                                                                                                      \
+    "kind,mode_reg,width_bits,symmetric,outmode,value_reg,pwmrate,pdmrate,A_state,A_period_hclk,A_high_hclk,A_high_" \
+    "sum,B_"                                                                                                         \
+    "state,B_period_hclk,B_high_hclk,B_high_sum\n"
+
+static void a_wrong_measurement_is_found(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *row;
+        bool passes;
+    } rows[] = {
+        {"pwm,01,10,0,0,01550000,FFFF,FFFF,pulses,1024,341,,const0,,,", true},
+        {"pwm,01,10,0,0,01550000,FFFF,FFFF,pulses,1024,340,,const0,,,", false},
+        {"pwm,01,10,0,0,01550000,FFFF,FFFF,pulses,1023,341,,const0,,,", false},
+        {"pwm,01,10,0,0,01550000,FFFF,FFFF,const0,,,,const0,,,", false},
+        {"pwm,01,10,0,0,01550000,FFFF,FFFF,pulses,1024,341,,const1,,,", false},
+        {"pwm,01,10,0,0,00000000,FFFF,FFFF,pulses,,,,const0,,,", false},
+        {"pdm,1B,12,0,3,0FA00000,FFFF,1234,pulses,590;591;604;605,576;577;590;591,16989/17397,const0,,,", true},
+        {"pdm,1B,12,0,3,0FA00000,FFFF,1234,pulses,590;591;604;605,576;577;590;591,16950/17397,const0,,,", false},
+        {"pdm,1B,12,0,3,0FA00000,FFFF,1234,pulses,590;591;604;606,576;577;590;591,,const0,,,", false},
+    };
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        char measure[1000];
+        snprintf(measure, sizeof(measure), "%s%s\n", MEASURE, rows[i].row);
+        const struct memory_file files[] = {{"tests.csv", "test,description\n"},
+                                            {"events.csv", NS_EVENTS "\n"},
+                                            {"measure.csv", measure},
+                                            {NULL, NULL}};
+        struct memory_folder folder = {.files = files};
+        const struct replay_totals totals = replay_memory("pwmgen", &folder);
+        if (totals.passed != rows[i].passes || totals.failed == rows[i].passes)
+            fail_msg("row %zu: %s", i, folder.first_difference);
+    }
+}
+
+static void a_wrong_reply_is_found(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *row, *difference;
+    } rows[] = {
+        {"0,udp,cookie,01420001,fecaaa55,11.7,27181", NULL},
+        {"0,udp,cookie,01420001,fecaaa54,11.7,27181", "reply byte 3 expected 54, got 55"},
+        {"0,udp,cookie,01420001,fecaaa,11.7,27181", "reply expected 3 bytes, got 4"},
+        {"0,udp,cookie,01420001,fecaaa55,25.0,27181", "reply expected after 25.00 us"},
+        {"0,udp,cookie,01420001,fecaaa55,11.7,27182", "reply port expected 27182, got 27181"},
+        {"0,udp,\"source port 5000\",01420001,fecaaa55,11.7,5000", NULL},
+        {"0,udp,destination port 27182: ignored,01420001,,,", NULL},
+        {"0,udp,destination port 27182: ignored,01420001,fecaaa55,11.7,27181", "reply expected 4 bytes, got 0"},
+    };
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        char exchanges[400];
+        snprintf(exchanges, sizeof(exchanges), "n,kind,description,request_hex,reply_hex,reply_us,reply_dst_port\n%s\n",
+                 rows[i].row);
+        const struct memory_file files[] = {{"exchanges.csv", exchanges}, {NULL, NULL}};
+        struct memory_folder folder = {.files = files};
+        const struct replay_totals totals = replay_memory("lbp16", &folder);
+        assert_int_equal(totals.passed + totals.failed, 1);
+        if (rows[i].difference ? !strstr(folder.first_difference, rows[i].difference) : totals.failed != 0)
+            fail_msg("row %zu: \"%s\"", i, folder.first_difference);
+    }
+}
+
+static void a_dump_and_its_index_must_agree(void **state)
+{
+    (void)state;
+    struct hm2_image image;
+    char dump[6000] = "0100 55AACAFE\n0104 54534F48\n0108 32544F4D\n010C 00000400\n";
+    assert_true(replay_firmware("JUSTIO_72", &image));
+    for (unsigned i = 0; i < HM2_IDROM_WORDS; i++)
+        if (image.rom[i])
+            snprintf(dump + strlen(dump), sizeof(dump) - strlen(dump), "%04X %08X\n", 0x400 + 4 * i,
+                     (unsigned)image.rom[i]);
+    static const struct {
+        const char *row, *difference;
+    } rows[] = {
+        {"a.hex,i80,7I80,3,72,100000000,200000000,watchdog:1 ioport:3 led:1", NULL},
+        {"a.hex,i80,7I81,3,72,100000000,200000000,watchdog:1 ioport:3 led:1", "board name expected 7I81, got 7I80"},
+        {"a.hex,i80,7I80,2,72,100000000,200000000,watchdog:1 ioport:3 led:1", "IO ports expected 2, got 3"},
+        {"a.hex,i80,7I80,3,72,100000000,200000001,watchdog:1 ioport:3 led:1", "clock high expected 200000001"},
+        {"a.hex,i80,7I80,3,72,100000000,200000000,watchdog:1 ioport:3v2 led:1", "modules expected"},
+        {"b.hex,i80,7I80,3,72,100000000,200000000,watchdog:1 ioport:3 led:1", "names a file that is not there"},
+    };
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        char index[300];
+        snprintf(index, sizeof(index),
+                 "file,card,board,ioports,iowidth,clocklow_hz,clockhigh_hz,modules(tag:instances[vVersion])\n%s\n",
+                 rows[i].row);
+        const struct memory_file files[] = {{"index.csv", index}, {"a.hex", dump}, {NULL, NULL}};
+        struct memory_folder folder = {.files = files};
+        const struct replay_totals totals = replay_memory("idrom", &folder);
+        if (rows[i].difference ? !strstr(folder.first_difference, rows[i].difference) : totals.failed != 0)
+            fail_msg("row %zu: \"%s\"", i, folder.first_difference);
+        if (rows[i].row[0] == 'b')
+            assert_int_equal(totals.failed, 2); /* a.hex is not in the index */
+    }
+}
+
+static void the_recorded_session_and_dumps_are_matched(void **state)
+{
+    (void)state;
+    struct replay_totals totals = replay_data("lbp16");
+    assert_int_equal(totals.failed, 0);
+    assert_int_equal(totals.passed, 102);
+    totals = replay_data("idrom");
+    assert_int_equal(totals.failed, 0);
+    assert_int_equal(totals.passed, 218);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -263,6 +505,14 @@ int main(void)
         cmocka_unit_test(signal_names_tell_inputs_from_outputs),
         cmocka_unit_test(every_folder_kind_has_its_firmware),
         cmocka_unit_test(an_unknown_folder_names_the_known_ones),
+        cmocka_unit_test(a_wrong_value_or_mask_of_a_read_is_found),
+        cmocka_unit_test(missing_extra_and_mistimed_edges_are_found),
+        cmocka_unit_test(a_wrong_level_in_a_vector_is_found),
+        cmocka_unit_test(a_test_without_events_fails),
+        cmocka_unit_test(a_wrong_measurement_is_found),
+        cmocka_unit_test(a_wrong_reply_is_found),
+        cmocka_unit_test(a_dump_and_its_index_must_agree),
+        cmocka_unit_test(the_recorded_session_and_dumps_are_matched),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
