@@ -313,9 +313,9 @@ static void command(struct module_rig *const rig, const struct measured *const m
     rig_cycle(rig);
 }
 
-static void duties_and_periods_are_those_that_the_firmware_makes(void **state)
+/* Hand every measurement to check(), which returns true when it could be compared; returns how many were. */
+static unsigned compare_rows(bool (*const check)(struct module_rig *rig, const struct measured *m))
 {
-    (void)state;
     size_t len;
     char *const text = load_text(TEST_DATA "/pwmgen/measure.csv", &len);
     struct module_rig *const rig = open_rig(rig_image_7i96s());
@@ -326,55 +326,55 @@ static void duties_and_periods_are_those_that_the_firmware_makes(void **state)
     for (char *row; (row = strsep(&rest, "\n")) && *row;) {
         struct measured m;
         parse_row(row, &m);
-        const unsigned counts = m.value >> 16 & 0xFFF;
-        const bool comparable = (strcmp(m.kind, "pwm") == 0 || strcmp(m.kind, "outmode") == 0) && !m.symmetric &&
-                                counts < 1u << m.bits && (counts > 0 || !(m.value >> 31));
-        if (!comparable)
-            continue;
-        command(rig, &m);
-        assert_int_equal(rig_written(rig, VALUE), m.value);
-        assert_int_equal(rig_written(rig, MODE), m.mode | 0x20); /* we add double buffering */
-        /* What we asked for is what came out: high time over period, and the period of the frequency. */
-        const bool on_b = strcmp(m.state_b, "pulses") == 0;
-        const unsigned period = on_b ? m.period_b : m.period_a, high = on_b ? m.high_b : m.high_a;
-        assert_int_equal(counts > 0, on_b || strcmp(m.state_a, "pulses") == 0);
-        if (counts > 0) {
-            const double hz = rig_get(rig, "pwmgen.pwm_frequency");
-            assert_int_equal(high, counts);
-            assert_true(fabs(CLOCK_HIGH_HZ / hz - period) < 1.5);
-        }
-        rows++;
+        rows += check(rig, &m);
     }
-    assert_true(rows >= 30);
     free(text);
     rig_free(rig);
+    return rows;
+}
+
+static bool check_pwm(struct module_rig *const rig, const struct measured *const m)
+{
+    const unsigned counts = m->value >> 16 & 0xFFF;
+    const bool is_pwm = strcmp(m->kind, "pwm") == 0 || strcmp(m->kind, "outmode") == 0;
+    if (!is_pwm || m->symmetric || counts >= 1u << m->bits || (counts == 0 && m->value >> 31))
+        return false;
+    command(rig, m);
+    assert_int_equal(rig_written(rig, VALUE), m->value);
+    assert_int_equal(rig_written(rig, MODE), m->mode | 0x20); /* we add double buffering */
+    /* What we asked for is what came out: high time over period, and the period of the frequency. */
+    const bool on_b = strcmp(m->state_b, "pulses") == 0;
+    assert_int_equal(counts > 0, on_b || strcmp(m->state_a, "pulses") == 0);
+    if (counts > 0) {
+        const double hz = rig_get(rig, "pwmgen.pwm_frequency");
+        assert_int_equal(on_b ? m->high_b : m->high_a, counts);
+        assert_true(fabs(CLOCK_HIGH_HZ / hz - (on_b ? m->period_b : m->period_a)) < 1.5);
+    }
+    return true;
+}
+
+static bool check_pdm(struct module_rig *const rig, const struct measured *const m)
+{
+    if (strcmp(m->kind, "pdm") != 0)
+        return false;
+    rig_set(rig, "pwmgen.pdm_frequency", floor(CLOCK_HIGH_HZ * (m->pdmrate + 0.5) / 65536.0));
+    command(rig, m);
+    assert_int_equal(rig_written(rig, VALUE), m->value);
+    assert_int_equal(rig_written(rig, MODE), m->mode);
+    assert_int_equal(rig_written(rig, PDM_RATE), m->pdmrate);
+    return true;
+}
+
+static void duties_and_periods_are_those_that_the_firmware_makes(void **state)
+{
+    (void)state;
+    assert_true(compare_rows(check_pwm) >= 30);
 }
 
 static void densities_are_those_that_the_firmware_makes(void **state)
 {
     (void)state;
-    size_t len;
-    char *const text = load_text(TEST_DATA "/pwmgen/measure.csv", &len);
-    struct module_rig *const rig = open_rig(rig_image_7i96s());
-    unsigned rows = 0;
-    char *rest = text;
-    (void)strsep(&rest, "\n");
-    rig_set(rig, "pwmgen.00.enable", 1);
-    for (char *row; (row = strsep(&rest, "\n")) && *row;) {
-        struct measured m;
-        parse_row(row, &m);
-        if (strcmp(m.kind, "pdm") != 0)
-            continue;
-        rig_set(rig, "pwmgen.pdm_frequency", floor(CLOCK_HIGH_HZ * (m.pdmrate + 0.5) / 65536.0));
-        command(rig, &m);
-        assert_int_equal(rig_written(rig, VALUE), m.value);
-        assert_int_equal(rig_written(rig, MODE), m.mode);
-        assert_int_equal(rig_written(rig, PDM_RATE), m.pdmrate);
-        rows++;
-    }
-    assert_true(rows >= 20);
-    free(text);
-    rig_free(rig);
+    assert_true(compare_rows(check_pdm) >= 20);
 }
 
 int main(void)
