@@ -24,6 +24,7 @@
 #define INDEX_COLUMNS  7u
 #define TAG_IOPORT     0x03u
 #define MAX_DESCRIPTOR 32u
+#define MAX_SENTENCE   180u
 
 /* Module names of the index. */
 static const struct {
@@ -126,14 +127,15 @@ static void compare_words(const struct hm2_image *const image, const struct inde
 
 static void compare_parser(const struct hm2_image *const image, char *const difference)
 {
-    static const char sentence_end[] = "\n";
     struct hm2_idrom *const idrom = calloc(1, sizeof(*idrom));
     struct hm2_diag *const diag = calloc(1, sizeof(*diag));
     if (idrom && diag && !difference[0]) {
         const bool refused = hm2_idrom_parse(image, NULL, idrom, diag) != 0;
         const bool contradiction = contradicts_itself(image);
+        const size_t line = strcspn(diag->text, "\n");
+        const size_t sentence = line < MAX_SENTENCE ? line : MAX_SENTENCE;
         if (refused && !contradiction)
-            snprintf(difference, REPLAY_TEXT, "expected to parse, got: %.180s", strtok(diag->text, sentence_end));
+            snprintf(difference, REPLAY_TEXT, "expected to parse, got: %.*s", (int)sentence, diag->text);
         else if (!refused && contradiction)
             snprintf(difference, REPLAY_TEXT, "expected a refusal of contradicting descriptors, got none");
         else if (!refused && (idrom->io_ports != image->rom[WORD_PORTS] || idrom->pin_count != image->rom[WORD_WIDTH] ||

@@ -198,17 +198,16 @@ static void usage(FILE *const to)
                 "  -j, --json        results as JSON\n"
                 "  -v, --verbose     a line of totals for every folder\n"
                 "  -h, --help        this text\n"
+                "  -V, --version     the version\n"
                 "Exit status: 0 all tests pass, 1 differences, 2 usage, 3 a folder cannot be read.\n");
 }
 
 static int parse_options(const int argc, char **const argv, struct settings *const settings)
 {
-    static const struct option options[] = {{"verbose", no_argument, NULL, 'v'},
-                                            {"json", no_argument, NULL, 'j'},
-                                            {"test", required_argument, NULL, 't'},
-                                            {"help", no_argument, NULL, 'h'},
-                                            {NULL, 0, NULL, 0}};
-    for (int c; (c = getopt_long(argc, argv, "vjt:h", options, NULL)) >= 0;) {
+    static const struct option options[] = {{"verbose", no_argument, NULL, 'v'},    {"json", no_argument, NULL, 'j'},
+                                            {"test", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'},
+                                            {"version", no_argument, NULL, 'V'},    {NULL, 0, NULL, 0}};
+    for (int c; (c = getopt_long(argc, argv, "vjt:hV", options, NULL)) >= 0;) {
         switch (c) {
         case 'v':
             settings->verbose = true;
@@ -221,6 +220,9 @@ static int parse_options(const int argc, char **const argv, struct settings *con
             break;
         case 'h':
             usage(stdout);
+            exit(0);
+        case 'V':
+            puts("hm2replay " HM2_VERSION);
             exit(0);
         default:
             usage(stderr);
