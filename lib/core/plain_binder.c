@@ -125,6 +125,12 @@ static void *plain_alloc(struct hm2_binder *const binder, const size_t size)
     return take((struct hm2_plain_binder *)binder, size);
 }
 
+static bool is_empty(const void *const slot)
+{
+    const void *const empty = NULL;
+    return memcmp(slot, &empty, sizeof empty) == 0;
+}
+
 static int plain_create(struct hm2_binder *const binder, const char *const full_name,
                         const struct hm2_point *const point, void *const slot, struct hm2_diag *const diag)
 {
@@ -134,6 +140,8 @@ static int plain_create(struct hm2_binder *const binder, const char *const full_
                             HM2_NAME_SIZE - 1);
     if (hm2_plain_find(plain, full_name))
         return hm2_diag_add(diag, HM2_ERR_HOST, "%s exists already", full_name);
+    if (!is_empty(slot))
+        return hm2_diag_add(diag, HM2_ERR_HOST, "%s: its pointer is in use", full_name);
     struct hm2_plain_object *const object = take(plain, sizeof *object);
     union value *const value = take(plain, sizeof *value);
     const char *const name = keep_text(plain, full_name);

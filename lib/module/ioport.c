@@ -144,9 +144,10 @@ static int bind_setup(const struct hm2_setup *const setup, struct ioport *const 
     struct io_setup *const row = &ctx->setups[ctx->setup_count++];
     row->port = (uint8_t)(io / setup->idrom->port_width);
     row->bit = (uint8_t)(io % setup->idrom->port_width);
-    row->is_output = &ctx->nothing;
     int err = 0;
-    if (!setup->pins[io].owner)
+    if (setup->pins[io].owner)
+        row->is_output = &ctx->nothing;
+    else
         err = hm2_bind_group(setup, &groups[GROUP_DIRECTION], row, io);
     if (err == 0)
         err = hm2_bind_group(setup, &groups[GROUP_OUTPUT], row, io);
@@ -163,8 +164,9 @@ static int bind_io(const struct hm2_setup *const setup, struct ioport *const ctx
     const uint32_t mask = 1u << bit;
     int err = hm2_bind_group(setup, &groups[GROUP_LEVEL], &port->levels[bit], io);
     port->present |= mask;
-    port->out[bit].out = &ctx->nothing;
-    if (err == 0 && !pin->owner) {
+    if (pin->owner) {
+        port->out[bit].out = &ctx->nothing;
+    } else if (err == 0) {
         port->gpio |= mask;
         port->gpio_first = port->gpio == mask ? bit : port->gpio_first;
         port->gpio_end = bit + 1;

@@ -135,13 +135,14 @@ static int setup_instance(const struct hm2_module *const module, struct hm2_setu
     instance->present = UINT32_MAX >> (MAX_INPUTS - instance->width);
     if (inputs == HM2_SCANNED_BY_WIDTH_AND_PIN)
         instance->present |= described(setup->idrom, module->md->gtag, unit);
-    for (unsigned i = 0; i < MAX_INPUTS; i++)
-        instance->slow[i].slow = &ctx->nothing;
     err = hm2_bind_group(setup, &module->type->groups[GROUP_MODULE], instance, unit);
     if (err == 0) {
         *instance->scan_width = instance->width;
         err = bind_inputs(setup, module->type->groups, instance, unit);
     }
+    for (unsigned i = 0; i < MAX_INPUTS; i++)
+        if (!instance->slow[i].slow)
+            instance->slow[i].slow = &ctx->nothing;
     instance->turns = hm2_turns(instance->end);
     return err;
 }

@@ -157,6 +157,16 @@ static void memory_of_the_binder_is_zeroed_and_apart(void **state)
     assert_null(binder->alloc(binder, SIZE_MAX));
 }
 
+static void a_pointer_in_use_is_refused(void **state)
+{
+    struct hm2_binder *const binder = hm2_plain_binder(*state);
+    struct hm2_diag diag = {0};
+    struct demo *const demo = bind_demo(*state, "a", 0);
+    assert_int_equal(hm2_bind_points(binder, demo_points, DEMO_POINTS, demo, "b", 0, &diag), HM2_ERR_HOST);
+    assert_non_null(strstr(diag.text, "b."));
+    assert_non_null(strstr(diag.text, "its pointer is in use"));
+}
+
 static void unknown_names_are_reported_as_such(void **state)
 {
     int err = 0;
@@ -211,6 +221,7 @@ int main(void)
         TEST(an_alias_leads_to_the_same_object_and_takes_its_name_away_from_others),
         TEST(values_stay_where_they_are_however_many_follow),
         TEST(memory_of_the_binder_is_zeroed_and_apart),
+        TEST(a_pointer_in_use_is_refused),
         TEST(unknown_names_are_reported_as_such),
         TEST(numbers_outside_a_type_saturate_and_nan_is_zero),
     };

@@ -58,7 +58,8 @@ struct hm2_binder {
     /* Zeroed memory that lives as long as the host's objects, for the structs that hold the pointers. NULL = none. */
     void *(*alloc)(struct hm2_binder *binder, size_t size);
     /* Create one object and store the pointer to its value at *slot (slot points at a typed pointer inside memory
-     * from alloc). Returns 0 or HM2_ERR_HOST with the reason in diag. */
+     * from alloc, and that pointer is NULL: hosts take any other as one in use already). Returns 0 or HM2_ERR_HOST with
+     * the reason in diag. */
     int (*create)(struct hm2_binder *binder, const char *full_name, const struct hm2_point *point, void *slot,
                   struct hm2_diag *diag);
     /* Give an existing parameter a second name. Failure is reported by the caller and otherwise ignored. */
