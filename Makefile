@@ -156,6 +156,23 @@ $(foreach c,$(COMPONENTS),$(eval $(call component_rule,$(c))))
 $(BUILDDIR)/test-components/%.so: $(BUILDDIR)/obj/tests/components/%.o $(call obj,$(COMPONENT_COMMON)) $(LIB_A)
 	$(component_link)
 
+# The same sources against LinuxCNC's own headers, where these are installed. Those are not clean for -Wpedantic and lack
+# prototypes.
+LINUXCNC_INCLUDE ?= /usr/include/linuxcnc
+LINUXCNC_SO := $(if $(wildcard $(LINUXCNC_INCLUDE)/hal.h),$(patsubst %,$(BUILDDIR)/linuxcnc/%.so,$(COMPONENTS)))
+
+$(BUILDDIR)/obj/linuxcnc/%.o: %.c
+	@mkdir -p $(@D)
+	$(call say,CC,$< (LinuxCNC))$(CC) $(ALL_CPPFLAGS) -Icomponents -isystem $(LINUXCNC_INCLUDE) -DRTAPI -D__MODULE__ -DUSPACE \
+		$(filter-out -Wpedantic -Wmissing-prototypes,$(ALL_CFLAGS)) $(DEPFLAGS) -c -o $@ $<
+$(BUILDDIR)/obj/linuxcnc/%.o: VISIBILITY := default
+
+define linuxcnc_rule
+$(BUILDDIR)/linuxcnc/$(1).so: $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc/%.o,$(wildcard components/$(1)/*.c) $(COMPONENT_COMMON)) $(LIB_A)
+	$$(component_link)
+endef
+$(foreach c,$(COMPONENTS),$(eval $(call linuxcnc_rule,$(c))))
+
 # The page lists the points from the tables that create them.
 $(BUILDDIR)/man/%: man/%.in $(BUILDDIR)/hm2points
 	@mkdir -p $(@D)
@@ -182,6 +199,7 @@ $(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(HOST_A) $(LIB_A)
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) -Wl,--whole-archive $(HOST_A) \
 		-Wl,--no-whole-archive $(LIB_A) -rdynamic -lm -lpthread -ldl
 
+$(BUILDDIR)/system/check_linuxcnc: | $(LINUXCNC_SO)
 # These load the test components.
 $(BUILDDIR)/unit/test_halhost $(BUILDDIR)/system/check_hm2host: | $(TEST_COMPONENT_SO)
 
@@ -245,4 +263,5 @@ clean: ## remove the build folder
 	rm -rf $(BUILDDIR)
 
 -include $(patsubst %.o,%.d,$(LIB_OBJ) $(SIM_OBJ) $(HOST_OBJ) \
-	$(call obj,$(wildcard tools/*/*.c components/*/*.c tests/*/*.c)))
+	$(call obj,$(wildcard tools/*/*.c components/*/*.c tests/*/*.c)) $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc/%.o, \
+	$(wildcard components/*/*.c)))
