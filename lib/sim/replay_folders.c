@@ -4,6 +4,7 @@
  * is one row here. Addresses are those of the old map (register map 2.2), which the recorded firmware has; each
  * folder's README gives them too.
  */
+#include <stdio.h>
 #include <string.h>
 
 #include "replay_trace.h"
@@ -37,6 +38,7 @@ static const struct replay_signal muxed_signals[] = {
     {"index", REPLAY_INPUT, HM2_GTAG_MUXED_ENCODER, 0x43, 0},
     {"mask", REPLAY_INPUT, HM2_GTAG_MUXED_ENCODER, 0x04, 0},
     {"select", REPLAY_OUTPUT, HM2_GTAG_MUXED_ENCODER_SEL, 0x81, 0},
+    {"select1", REPLAY_OUTPUT, HM2_GTAG_MUXED_ENCODER_SEL, 0x82, 0},
     {NULL, REPLAY_PAD, 0, 0, 0},
 };
 
@@ -99,25 +101,31 @@ static const struct replay_signal led_outputs[] = {
     {"led3", REPLAY_OUTPUT, HM2_GTAG_LED, 0x81, 3},
 };
 
-#define IOPORT_PADS 48u
+#define IOPORT_PORTS 2 /* of SVST4_4_48 */
+#define IOPORT_WIDTH 24u
 
-/* The bench of test "input" drives every third pad high and the others low, and lets go of a pad before it makes it
- * an output: that is in the test's description only. The other tests have pull-ups. */
+/* A test whose description says that pins are driven from outside does not list how: what the port then reads on pins
+ * that the card does not drive is what was there. The other tests have pull-ups. */
 static int ioport_stimulus(struct replay_run *const run, const struct replay_event *const event)
 {
-    if (strcmp(run->test->name, "input") != 0)
+    char value_text[16];
+    uint32_t value = 0, floating = 0;
+    int64_t port = 0;
+    if (!strstr(run->test->description, "driven from outside") || event->kind != 'R' ||
+        strncmp(event->name, "port", 4) != 0 || replay_decimal(event->name + 4, IOPORT_PORTS - 1, &port))
         return 0;
+    const size_t len = strcspn(event->value, "/");
+    snprintf(value_text, sizeof(value_text), "%.*s", (int)(len < 12 ? len : 12), event->value);
+    if (replay_hex32(value_text, &value) || (event->value[len] && replay_hex32(event->value + len + 1, &floating)))
+        return 0; /* the read will say so */
     const int64_t before = replay_clk(run, event->at) - 1;
-    const bool first = run->state[0]++ == 0;
-    for (unsigned io = 0; first && io < IOPORT_PADS; io++)
-        if (sim_card_drive(run->card, before, io, io % 3 == 0 ? SIM_HIGH : SIM_LOW))
+    sim_card_advance(run->card, before);
+    for (unsigned bit = 0; bit < IOPORT_WIDTH; bit++) {
+        const unsigned io = (unsigned)port * IOPORT_WIDTH + bit;
+        const enum sim_level level = floating >> bit & 1u ? SIM_FLOAT : value >> bit & 1u ? SIM_HIGH : SIM_LOW;
+        if (sim_card_pad(run->card, io) == SIM_FLOAT && sim_card_drive(run->card, before, io, level))
             return HM2_ERR_STATE;
-    uint32_t outputs = 0;
-    if (event->kind != 'W' || strcmp(event->name, "ddr0") != 0 || replay_hex32(event->value, &outputs))
-        return 0;
-    for (unsigned io = 0; io < IOPORT_PADS / 2; io++)
-        if ((outputs >> io & 1u) && sim_card_drive(run->card, before, io, SIM_FLOAT))
-            return HM2_ERR_STATE;
+    }
     return 0;
 }
 

@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "replay_trace.h"
+#include "sim_qcounter.h"
 
 #define ENCODERS       8u
 #define GAP_CLK        40 /* longer than this between two accesses: the bench did something */
@@ -35,10 +36,12 @@ struct maker {
     size_t count;
     struct replay_event_list *out;
     uint16_t position[ENCODERS]; /* as the inputs are */
-    uint16_t counted[ENCODERS];  /* as read last */
+    uint32_t data[ENCODERS];     /* count register as read last; 0 in its lower half after a write */
+    uint16_t latched[ENCODERS];
     bool index[ENCODERS];
     uint16_t control[ENCODERS];
     int64_t tick; /* select period */
+    struct sim_timestamp stamps;
     int err;
 };
 
@@ -128,54 +131,115 @@ static bool hex_before_slash(const char *const text, uint32_t *const value)
     return replay_hex32(part, value) == 0;
 }
 
-/* Edges that end such that the last one is counted at the time of the stamp. The time stamp runs at half the clock
- * after configuration. */
-static void make_counts(struct maker *const m, const unsigned encoder, const uint32_t data, const int64_t from,
-                        const int64_t to)
+/* The reads that follow a gap. */
+struct seen {
+    bool has_data, has_control;
+    uint32_t data, control;
+};
+
+static int64_t filter_ticks(const struct maker *const m, const unsigned encoder)
 {
-    const int delta = (int16_t)((data & 0xFFFFu) - m->counted[encoder]);
-    m->counted[encoder] = (uint16_t)data;
-    if (delta == 0)
-        return;
+    return (m->control[encoder] & SIM_QC_FILTER) ? LONG_TICKS : FILTER_TICKS;
+}
+
+/* When the counter must have counted to show this stamp at `to`: in the middle of the stamp's tick. */
+static int64_t stamped_clk(const struct maker *const m, const uint16_t stamp, const int64_t to)
+{
+    const int64_t period = m->stamps.divider.period;
+    const uint16_t ticks_ago = (uint16_t)(sim_timestamp_at(&m->stamps, to) - stamp);
+    const int64_t next_tick = sim_divider_tick(&m->stamps.divider, to);
+    return next_tick - ticks_ago * period - (period - 1) / 2;
+}
+
+/* Edges that end such that the last one is counted at the time of the stamp. */
+static void make_edges(struct maker *const m, const unsigned encoder, const int delta, const int64_t from,
+                       const int64_t to)
+{
     const int edges = delta < 0 ? -delta : delta;
-    const int64_t round = 2 * 65536;
-    const int64_t stamp_clk = (int64_t)(data >> 16) * 2;
-    const int64_t counted = to - ((to - stamp_clk) % round + round) % round;
-    const int64_t ticks = (m->control[encoder] & 0x800u) ? LONG_TICKS : FILTER_TICKS;
-    const int64_t last = counted - (ticks + 1) * m->tick;
-    const int64_t room = edges > 1 ? (last - from) / (edges - 1) : 0;
-    if (edges > 1 && room < 1)
+    const int64_t counted = stamped_clk(m, (uint16_t)(m->data[encoder] >> 16), to);
+    const int64_t last = counted - (filter_ticks(m, encoder) + 1) * m->tick;
+    const int64_t room = edges > 1 ? (last - from) / (edges - 1) : EDGE_CLK;
+    if (room < 1)
         return; /* so many edges do not fit: the count will differ */
     const int64_t step = room < EDGE_CLK ? room : EDGE_CLK;
     for (int n = 0; n < edges; n++)
         make_edge(m, encoder, last - (edges - 1 - n) * step, delta > 0);
 }
 
-static void make_index(struct maker *const m, const unsigned encoder, const uint32_t control, const int64_t from,
+/* Counts that an index cleared in the same gap: what was latched tells how many, or the levels of A and B, modulo 4. */
+static int cleared_counts(const struct maker *const m, const unsigned encoder, const struct seen *const seen,
+                          const uint16_t before)
+{
+    if (m->control[encoder] & SIM_QC_LATCH)
+        return (int16_t)((seen->control >> 16) - before);
+    const unsigned a = seen->control & 1u, b = seen->control >> 1 & 1u;
+    const unsigned phase = b ? 3u - a : a;
+    return (int)((phase - m->position[encoder]) & 3u);
+}
+
+static void make_counts(struct maker *const m, const unsigned encoder, const struct seen *const seen,
+                        const bool index_edge, const int64_t from, const int64_t to)
+{
+    const uint32_t old = m->data[encoder];
+    m->data[encoder] = seen->data;
+    if (seen->data >> 16 == old >> 16)
+        return; /* nothing was counted: the count was cleared, at most */
+    int delta = (int16_t)((seen->data & 0xFFFFu) - (old & 0xFFFFu));
+    if (index_edge && (m->control[encoder] & SIM_QC_CLEAR) && (seen->data & 0xFFFFu) == 0)
+        delta = cleared_counts(m, encoder, seen, (uint16_t)old);
+    make_edges(m, encoder, delta, from, to);
+}
+
+/* The index is at another level than before, or there was a pulse of it that latched something. Gated by A and B it
+ * cannot be told. Returns whether there was an edge that latches and clears. */
+static bool make_index(struct maker *const m, const unsigned encoder, const uint32_t control, const int64_t from,
                        const int64_t to)
 {
-    const bool polarity = control >> 3 & 1u, seen = control >> 2 & 1u;
-    const bool level = seen == polarity;
-    if (level == m->index[encoder] || (control & 0x80u)) /* gated by A and B: cannot be told */
-        return;
-    const int64_t lead = to - INDEX_LEAD_CLK;
-    make(m, level && lead > from ? lead : from, INPUT_INDEX, encoder, level);
-    m->index[encoder] = level;
+    const bool polarity = control & SIM_QC_INDEX_POL, conditioned = control >> 2 & 1u;
+    const bool level = conditioned == polarity;
+    const bool latched = control >> 16 != m->latched[encoder];
+    const int64_t pulse = (filter_ticks(m, encoder) + 4) * m->tick; /* long enough for the filter */
+    const int64_t before = pulse > INDEX_LEAD_CLK ? pulse : INDEX_LEAD_CLK;
+    m->latched[encoder] = (uint16_t)(control >> 16);
+    if (control & SIM_QC_AB_GATE)
+        return false;
+    if (level != m->index[encoder]) {
+        make(m, level && to - before > from ? to - before : from, INPUT_INDEX, encoder, level);
+        m->index[encoder] = level;
+        return level == polarity;
+    }
+    if (!latched)
+        return false;
+    const int64_t start = to - 2 * pulse > from ? to - 2 * pulse : from;
+    make(m, start, INPUT_INDEX, encoder, !level);
+    make(m, start + pulse, INPUT_INDEX, encoder, level);
+    return true;
 }
 
 /* What happened in a gap: the reads that follow it tell. */
 static void explain_gap(struct maker *const m, const size_t first, const int64_t from, const int64_t to)
 {
+    struct seen seen[ENCODERS] = {0};
     for (size_t i = first; i < m->count && m->events[i].at - to < GAP_CLK; i++) {
         const struct replay_event *const event = &m->events[i];
         uint32_t value = 0;
         unsigned encoder = 0;
         if (event->kind != 'R' || !hex_before_slash(event->value, &value))
             continue;
-        if (numbered(event, "count", &encoder))
-            make_counts(m, encoder, value, from, to);
-        else if (numbered(event, "control", &encoder))
-            make_index(m, encoder, value, from, to);
+        if (numbered(event, "count", &encoder) && !seen[encoder].has_data) {
+            seen[encoder].has_data = true;
+            seen[encoder].data = value;
+        } else if (numbered(event, "control", &encoder) && !seen[encoder].has_control) {
+            seen[encoder].has_control = true;
+            seen[encoder].control = value;
+        }
+    }
+    for (unsigned encoder = 0; encoder < ENCODERS; encoder++) {
+        bool index_edge = false;
+        if (seen[encoder].has_control)
+            index_edge = make_index(m, encoder, seen[encoder].control, from, to);
+        if (seen[encoder].has_data)
+            make_counts(m, encoder, &seen[encoder], index_edge, from, to);
     }
 }
 
@@ -190,8 +254,10 @@ static void follow_writes(struct maker *const m, const size_t from, const size_t
             continue;
         if (strcmp(event->name, "filterrate") == 0)
             m->tick = value & 0x800u ? 1 : (value & 0xFFFu) + 2;
+        else if (strcmp(event->name, "tsdiv") == 0)
+            sim_timestamp_write(&m->stamps, event->at, (uint16_t)value);
         else if (numbered(event, "count", &encoder))
-            m->counted[encoder] = 0;
+            m->data[encoder] &= 0xFFFF0000u;
         else if (numbered(event, "control", &encoder))
             m->control[encoder] = (uint16_t)value;
     }
@@ -219,6 +285,7 @@ int replay_muxed_inputs(const struct replay_trace *const trace, const struct rep
                         struct replay_event_list *const out)
 {
     struct maker m = {.events = trace->events + test->first, .count = test->count, .out = out, .tick = POWER_UP_TICK};
+    sim_divider_start(&m.stamps.divider, 0, 0, SIM_TSDIV_TOP_BIT);
     unsigned edges = 0, clk_per_edge = 0;
     if (has_inputs(&m))
         return 0;

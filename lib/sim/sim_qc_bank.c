@@ -6,8 +6,7 @@
 #include "map.h"
 #include "sim_qcounter.h"
 
-#define TSDIV_TOP_BIT 0x8000u
-#define STEP_ONE      (1ll << 32) /* of sim_stepgen_position() */
+#define STEP_ONE (1ll << 32) /* of sim_stepgen_position() */
 
 /* ---- life
  * ------------------------------------------------------------------------------------------------------------- */
@@ -38,7 +37,7 @@ void sim_qc_bank_power_up(struct sim_module *const m, struct sim_qc_bank *const 
     for (unsigned i = 0; i < bank->count; i++)
         bank->counters[i].last_edge = INT64_MIN;
     bank->stamps = (struct sim_timestamp){.since = m->clk};
-    sim_divider_start(&bank->stamps.divider, m->clk, 0, TSDIV_TOP_BIT);
+    sim_divider_start(&bank->stamps.divider, m->clk, 0, SIM_TSDIV_TOP_BIT);
     bank->select = 0;
     bank->sampled_stamp = 0;
 }
@@ -101,12 +100,8 @@ uint32_t sim_qc_bank_read(struct sim_module *const m, struct sim_qc_bank *const 
 
 void sim_qc_bank_write(struct sim_qc_bank *const bank, const int64_t clk, const unsigned page, const uint32_t value)
 {
-    struct sim_timestamp *const ts = &bank->stamps;
     if (page == SIM_QC_PAGE_TSDIV) {
-        ts->base = sim_timestamp_at(ts, clk + 1);
-        ts->since = clk + 1;
-        ts->divisor = (uint16_t)value;
-        sim_divider_write(&ts->divider, clk, ts->divisor, TSDIV_TOP_BIT);
+        sim_timestamp_write(&bank->stamps, clk, (uint16_t)value);
     } else if (page == SIM_QC_PAGE_SELECT && bank->type.dpll_select) {
         bank->select = value >> 12 & 0xFu;
     }

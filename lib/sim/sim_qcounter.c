@@ -40,6 +40,14 @@ void sim_divider_write(struct sim_divider *const d, const int64_t clk, const uin
     d->period = period_of(value, top_bit);
 }
 
+void sim_timestamp_write(struct sim_timestamp *const ts, const int64_t clk, const uint16_t divisor)
+{
+    ts->base = sim_timestamp_at(ts, clk + 1);
+    ts->since = clk + 1;
+    ts->divisor = divisor;
+    sim_divider_write(&ts->divider, clk, divisor, SIM_TSDIV_TOP_BIT);
+}
+
 uint16_t sim_timestamp_at(const struct sim_timestamp *const ts, const int64_t clk)
 {
     return (uint16_t)(ts->base + (uint64_t)sim_divider_count(&ts->divider, ts->since, clk));

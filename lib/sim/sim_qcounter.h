@@ -34,6 +34,10 @@ struct sim_timestamp {
     int64_t since;
 };
 
+#define SIM_TSDIV_TOP_BIT 0x8000u
+
+/* The divisor is written at edge clk. */
+void sim_timestamp_write(struct sim_timestamp *ts, int64_t clk, uint16_t divisor);
 uint16_t sim_timestamp_at(const struct sim_timestamp *ts, int64_t clk);
 
 /* ---- one counter ----------------------------------------------------------------------------------------------------

@@ -315,7 +315,7 @@ static struct replay_totals replay_memory(const char *const kind, struct memory_
 static void check_events(const char *const kind, const char *const header, const char *const events,
                          const char *const difference)
 {
-    char text[1000];
+    char text[8000];
     snprintf(text, sizeof(text), "%s\n%s", header, events);
     const struct memory_file files[] = {{"tests.csv", "test,description\nt,\n"}, {"events.csv", text}, {NULL, NULL}};
     struct memory_folder folder = {.files = files};
@@ -480,6 +480,114 @@ static void a_dump_and_its_index_must_agree(void **state)
     }
 }
 
+/* ---- recordings without inputs
+ * ----------------------------------------------------------------------------------------------- */
+
+/* A bench as the recorded one: it does something to the encoders, waits, and reads count and control of both. */
+struct bench {
+    struct sim_card *card;
+    int64_t clk;
+    unsigned position[2];
+    char events[6000];
+};
+
+static void bench_note(struct bench *const b, const char kind, const char *const name, const unsigned encoder,
+                       const uint32_t value, const uint32_t mask)
+{
+    const size_t used = strlen(b->events);
+    char number[4] = "";
+    if (encoder < 2)
+        snprintf(number, sizeof(number), "%u", encoder);
+    snprintf(b->events + used, sizeof(b->events) - used, "t,%lld,%c,%s%s,%08X", (long long)b->clk, kind, name, number,
+             (unsigned)value);
+    if (mask)
+        snprintf(b->events + strlen(b->events), sizeof(b->events) - strlen(b->events), "/%08X", (unsigned)mask);
+    strcat(b->events, "\n");
+}
+
+static void bench_write(struct bench *const b, const char *const name, const unsigned encoder, const uint16_t address,
+                        const uint32_t value)
+{
+    b->clk += 3;
+    sim_card_write(b->card, b->clk, address, value);
+    bench_note(b, 'W', name, encoder, value, 0);
+}
+
+static void bench_read(struct bench *const b)
+{
+    for (unsigned reg = 0; reg < 2; reg++)
+        for (unsigned e = 0; e < 2; e++) {
+            b->clk += 3;
+            uint32_t undriven = 0;
+            const uint16_t address = (uint16_t)(0x3500 + 0x100 * reg + 4 * e);
+            const uint32_t value = sim_card_read(b->card, b->clk, address, &undriven) & ~undriven;
+            bench_note(b, 'R', reg ? "control" : "count", e, value, undriven);
+        }
+}
+
+static void bench_input(struct bench *const b, const unsigned encoder, const uint8_t pin, const bool level)
+{
+    assert_int_equal(
+        sim_card_drive_input(b->card, b->clk, HM2_GTAG_MUXED_ENCODER, encoder, pin, level ? SIM_HIGH : SIM_LOW), 0);
+}
+
+static void bench_turn(struct bench *const b, const unsigned encoder, const int edges, const int64_t clk_per_edge)
+{
+    for (int i = 0; i < abs(edges); i++, b->clk += clk_per_edge) {
+        b->position[encoder] += edges > 0 ? 1u : 3u;
+        bench_input(b, encoder, 0x41, (b->position[encoder] + 1) & 2u);
+        bench_input(b, encoder, 0x42, b->position[encoder] & 2u);
+    }
+}
+
+static void record_without_inputs(struct bench *const b, const uint32_t control, const uint32_t tsdiv,
+                                  const int64_t clk_per_edge)
+{
+    struct hm2_image image;
+    assert_true(replay_firmware("SV6_7I48_48", &image));
+    const struct sim_card_options options = {.profile = "7i93", .image = &image};
+    assert_int_equal(sim_card_new(&b->card, &options, NULL), 0);
+    for (unsigned e = 0; e < 8; e++)
+        for (uint8_t pin = 0x41; pin <= 0x43; pin++)
+            assert_int_equal(sim_card_drive_input(b->card, -1, HM2_GTAG_MUXED_ENCODER, e, pin, SIM_LOW), 0);
+    b->clk = 6;
+    bench_write(b, "tsdiv", 9, 0x3700, tsdiv);
+    b->clk = 300;
+    for (unsigned e = 0; e < 2; e++)
+        bench_write(b, "control", e, (uint16_t)(0x3600 + 4 * e), control);
+    b->clk += 300;
+    bench_turn(b, 0, 5, clk_per_edge);
+    bench_turn(b, 1, -3, clk_per_edge);
+    b->clk += 500;
+    bench_read(b);
+    for (unsigned e = 0; e < 2; e++) {
+        bench_input(b, e, 0x43, true);
+        b->clk += 600;
+        bench_read(b);
+        bench_input(b, e, 0x43, false);
+        b->clk += 600;
+        bench_read(b);
+    }
+    bench_turn(b, 0, 4, clk_per_edge);
+    b->clk += 500;
+    bench_read(b);
+    sim_card_free(b->card);
+}
+
+static void inputs_that_were_not_recorded_follow_from_the_reads(void **state)
+{
+    (void)state;
+    static const uint32_t controls[] = {0x0000, 0x0018, 0x0010, 0x0028, 0x0038, 0x0058, 0x0068, 0x0078, 0x0030, 0x0818};
+    static const uint32_t dividers[] = {0, 1, 8, 48, 0x8000};
+    for (size_t i = 0; i < sizeof(controls) / sizeof(controls[0]); i++)
+        for (size_t d = 0; d < sizeof(dividers) / sizeof(dividers[0]); d++) {
+            static struct bench b;
+            memset(&b, 0, sizeof(b));
+            record_without_inputs(&b, controls[i], dividers[d], controls[i] & 0x800u ? 500 : 150);
+            check_events("encoder_muxed", CLK_EVENTS, b.events, NULL);
+        }
+}
+
 static void the_recorded_session_and_dumps_are_matched(void **state)
 {
     (void)state;
@@ -512,6 +620,7 @@ int main(void)
         cmocka_unit_test(a_wrong_measurement_is_found),
         cmocka_unit_test(a_wrong_reply_is_found),
         cmocka_unit_test(a_dump_and_its_index_must_agree),
+        cmocka_unit_test(inputs_that_were_not_recorded_follow_from_the_reads),
         cmocka_unit_test(the_recorded_session_and_dumps_are_matched),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
