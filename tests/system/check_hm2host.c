@@ -318,10 +318,13 @@ END_TEST
 
 START_TEST(an_interrupt_ends_run_and_the_file_goes_on)
 {
-    const char *const args[] = {write_file("t.hal", "loadrt threads name1=t\nstart\necho running\nrun 1000\necho on\n"),
+    const char *const args[] = {write_file("t.hal", "loadrt threads name1=t period1=1000000\n"
+                                                    "loadrt hm2_points_test print_every=500\n"
+                                                    "addf points.0.update t\nstart\nrun 1000\necho on\n"),
                                 NULL};
     start_host(args);
-    ck_assert(process_wait_line(&host, "running", END_MS, NULL));
+    /* By then `run` has begun: an interruption between two commands would end the file. */
+    ck_assert(process_wait_line(&host, "points_test: cycle 500", END_MS, NULL));
     ck_assert_int_eq(process_stop(&host, SIGINT, END_MS), 0);
     expect_text("\non\n");
 }
