@@ -57,7 +57,7 @@ static int run_linkps(struct hal_session *const session, char *const *const args
                       struct hm2_diag *const diag)
 {
     (void)session;
-    const char *pin, *signal;
+    const char *pin = NULL, *signal = NULL;
     const int err = two_names("linkps", args, count, &pin, &signal, diag);
     return err ? err : hh_link(hh_host(), pin, signal, diag);
 }
@@ -66,7 +66,7 @@ static int run_linksp(struct hal_session *const session, char *const *const args
                       struct hm2_diag *const diag)
 {
     (void)session;
-    const char *pin, *signal;
+    const char *pin = NULL, *signal = NULL;
     const int err = two_names("linksp", args, count, &signal, &pin, diag);
     return err ? err : hh_link(hh_host(), pin, signal, diag);
 }
@@ -138,7 +138,7 @@ static int run_net(struct hal_session *const session, char *const *const args, c
 static int run_linkpp(struct hal_session *const session, char *const *const args, const size_t count,
                       struct hm2_diag *const diag)
 {
-    const char *first, *second;
+    const char *first = NULL, *second = NULL;
     const int err = two_names("linkpp", args, count, &first, &second, diag);
     if (err)
         return err;

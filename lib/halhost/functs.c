@@ -77,7 +77,8 @@ int hh_funct_export(struct hh *const host, const char *const name, void (*const 
 
 static struct hh_schedule *schedule_new(const size_t count)
 {
-    struct hh_schedule *const schedule = malloc(sizeof *schedule + (count ? count : 1) * sizeof schedule->functs[0]);
+    /* NOLINTNEXTLINE(bugprone-sizeof-expression): a schedule holds pointers. */
+    struct hh_schedule *const schedule = malloc(sizeof *schedule + count * sizeof(struct hh_funct *));
     if (schedule)
         schedule->count = count;
     return schedule;

@@ -66,15 +66,12 @@ struct inifile *inifile_parse(const char *const text, const size_t length, const
                               struct hm2_diag *const diag)
 {
     struct inifile *const ini = calloc(1, sizeof *ini);
-    char *const copy = ini ? malloc(length + 1) : NULL;
+    char *const copy = ini ? strndup(text, length) : NULL;
     if (!copy) {
         free(ini);
         hm2_diag_add(diag, HM2_ERR_NOMEM, "%s: no memory", name);
         return NULL;
     }
-    if (length > 0)
-        memcpy(copy, text, length);
-    copy[length] = '\0';
     ini->text = copy;
     const char *section = "";
     unsigned number = 0;

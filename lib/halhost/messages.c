@@ -167,17 +167,18 @@ static void default_handler(msg_level_t level, const char *format, va_list args)
 static void default_handler(const msg_level_t level, const char *const format, va_list args)
 {
     const struct hh *const host = hh_host();
-    if (!host)
+    struct hh_messages *const messages = host ? host->messages : NULL;
+    if (!messages)
         return;
     const enum halhost_stream stream = level == RTAPI_MSG_ALL ? HALHOST_STDOUT : HALHOST_STDERR;
     if (rtapi_task_self() >= 0) {
-        push(host->messages, stream, format, args);
+        push(messages, stream, format, args);
         return;
     }
     char text[HM2_DIAG_SIZE];
     if (vsnprintf(text, sizeof text, format, args) >= 0) {
-        hh_messages_drain(host->messages); /* keep the order */
-        deliver(&host->options, stream, text);
+        hh_messages_drain(messages); /* keep the order */
+        deliver(messages->options, stream, text);
     }
 }
 

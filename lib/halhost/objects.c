@@ -171,6 +171,7 @@ static void format_name(char text[const HH_NAME_SIZE + 1], const char *const for
 }
 
 /* The typed calls differ in the type only. */
+/* NOLINTBEGIN(bugprone-macro-parentheses): c_type is a type. */
 #define TYPED_CALLS(suffix, c_type, hal_type)                                                              \
     int hal_pin_##suffix##_new(const char *const name, const hal_pin_dir_t dir, c_type **const pointer,    \
                                const int comp_id)                                                          \
@@ -207,6 +208,7 @@ TYPED_CALLS(bit, hal_bit_t, HAL_BIT)
 TYPED_CALLS(float, hal_float_t, HAL_FLOAT)
 TYPED_CALLS(u32, hal_u32_t, HAL_U32)
 TYPED_CALLS(s32, hal_s32_t, HAL_S32)
+/* NOLINTEND(bugprone-macro-parentheses) */
 
 int hal_pin_alias(const char *const name, const char *const alias)
 {

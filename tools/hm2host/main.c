@@ -399,7 +399,7 @@ static int run_host(const struct arguments *const arguments)
 int main(const int argc, char *const argv[])
 {
     static struct arguments arguments = {.cpu = HALHOST_CPU_DEFAULT};
-    char own[PATH_MAX + 16];
+    static char own[PATH_MAX + 16];
     (void)setvbuf(stdout, NULL, _IOLBF, 0);
     const int status = parse(&arguments, argc, argv);
     if (status)
