@@ -152,6 +152,21 @@ int replay_decimal(const char *text, const int64_t max, int64_t *const value)
     return 0;
 }
 
+const char *replay_take_number(const char *const text, const unsigned max, unsigned *const number)
+{
+    char digits[12];
+    int64_t value = 0;
+    const size_t len = strspn(text, "0123456789");
+    if (len == 0 || len >= sizeof(digits))
+        return NULL;
+    memcpy(digits, text, len);
+    digits[len] = '\0';
+    if (replay_decimal(digits, max, &value))
+        return NULL;
+    *number = (unsigned)value;
+    return text + len;
+}
+
 static int hex_digit(const char c)
 {
     if (c >= '0' && c <= '9')

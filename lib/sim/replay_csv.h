@@ -38,6 +38,8 @@ int HM2_MUST_CHECK replay_csv_need(const struct replay_csv *csv, const char *nam
 
 /* Whole string as a number, no sign, no spaces: 0 or HM2_ERR_MALFORMED / HM2_ERR_RANGE. */
 int HM2_MUST_CHECK replay_decimal(const char *text, int64_t max, int64_t *value);
+/* A number at the start of a text: where it ends, or NULL when there is none up to max. */
+const char *HM2_MUST_CHECK replay_take_number(const char *text, unsigned max, unsigned *number);
 int HM2_MUST_CHECK replay_hex32(const char *text, uint32_t *value);
 
 #endif

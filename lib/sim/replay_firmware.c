@@ -13,11 +13,10 @@
 
 struct firmware {
     const char *name;
-    uint32_t header[HEADER_WORDS];
     const uint32_t *modules;
-    unsigned module_words;
     const uint32_t *pins;
-    unsigned pin_words;
+    unsigned module_words, pin_words;
+    uint32_t header[HEADER_WORDS];
 };
 
 static const uint32_t svst8_4im2_72_modules[] = {
@@ -112,48 +111,48 @@ static const uint32_t svst8_4im2si_72_pins[] = {
 };
 
 static const struct firmware firmwares[] = {
-    {"SVST8_4IM2_72",
-     {0x3, 0x40, 0x1C0, 0x4153454D, 0x30384937, 0x10, 0x100, 0x3, 0x48, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40, 0x100,
-      0x100},
-     svst8_4im2_72_modules,
-     sizeof(svst8_4im2_72_modules) / sizeof(uint32_t),
-     svst8_4im2_72_pins,
-     sizeof(svst8_4im2_72_pins) / sizeof(uint32_t)},
-    {"SVST4_4_48",
-     {0x3, 0x40, 0x1C0, 0x4153454D, 0x33394937, 0x9, 0x90, 0x2, 0x30, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40, 0x100,
-      0x100},
-     svst4_4_48_modules,
-     sizeof(svst4_4_48_modules) / sizeof(uint32_t),
-     svst4_4_48_pins,
-     sizeof(svst4_4_48_pins) / sizeof(uint32_t)},
-    {"SV6_7I48_48",
-     {0x3, 0x40, 0x1C0, 0x4153454D, 0x33394937, 0x9, 0x90, 0x2, 0x30, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40, 0x100,
-      0x100},
-     sv6_7i48_48_modules,
-     sizeof(sv6_7i48_48_modules) / sizeof(uint32_t),
-     sv6_7i48_48_pins,
-     sizeof(sv6_7i48_48_pins) / sizeof(uint32_t)},
-    {"7I76E_51",
-     {0x3, 0x40, 0x1C0, 0x4153454D, 0x36374937, 0x10, 0x100, 0x3, 0x33, 0x11, 0x5F5E100, 0xBEBC200, 0x4, 0x40, 0x100,
-      0x100},
-     ii76e_51_modules,
-     sizeof(ii76e_51_modules) / sizeof(uint32_t),
-     ii76e_51_pins,
-     sizeof(ii76e_51_pins) / sizeof(uint32_t)},
-    {"JUSTIO_72",
-     {0x3, 0x40, 0x1C0, 0x4153454D, 0x30384937, 0x10, 0x100, 0x3, 0x48, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40, 0x100,
-      0x100},
-     justio_72_modules,
-     sizeof(justio_72_modules) / sizeof(uint32_t),
-     justio_72_pins,
-     sizeof(justio_72_pins) / sizeof(uint32_t)},
-    {"SVST8_4IM2SI_72",
-     {0x3, 0x40, 0x1C0, 0x4153454D, 0x30384937, 0x10, 0x100, 0x3, 0x48, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40, 0x100,
-      0x100},
-     svst8_4im2si_72_modules,
-     sizeof(svst8_4im2si_72_modules) / sizeof(uint32_t),
-     svst8_4im2si_72_pins,
-     sizeof(svst8_4im2si_72_pins) / sizeof(uint32_t)},
+    {.name = "SVST8_4IM2_72",
+     .modules = svst8_4im2_72_modules,
+     .pins = svst8_4im2_72_pins,
+     .module_words = sizeof(svst8_4im2_72_modules) / sizeof(uint32_t),
+     .pin_words = sizeof(svst8_4im2_72_pins) / sizeof(uint32_t),
+     .header = {0x3, 0x40, 0x1C0, 0x4153454D, 0x30384937, 0x10, 0x100, 0x3, 0x48, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40,
+                0x100, 0x100}},
+    {.name = "SVST4_4_48",
+     .modules = svst4_4_48_modules,
+     .pins = svst4_4_48_pins,
+     .module_words = sizeof(svst4_4_48_modules) / sizeof(uint32_t),
+     .pin_words = sizeof(svst4_4_48_pins) / sizeof(uint32_t),
+     .header = {0x3, 0x40, 0x1C0, 0x4153454D, 0x33394937, 0x9, 0x90, 0x2, 0x30, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40,
+                0x100, 0x100}},
+    {.name = "SV6_7I48_48",
+     .modules = sv6_7i48_48_modules,
+     .pins = sv6_7i48_48_pins,
+     .module_words = sizeof(sv6_7i48_48_modules) / sizeof(uint32_t),
+     .pin_words = sizeof(sv6_7i48_48_pins) / sizeof(uint32_t),
+     .header = {0x3, 0x40, 0x1C0, 0x4153454D, 0x33394937, 0x9, 0x90, 0x2, 0x30, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40,
+                0x100, 0x100}},
+    {.name = "7I76E_51",
+     .modules = ii76e_51_modules,
+     .pins = ii76e_51_pins,
+     .module_words = sizeof(ii76e_51_modules) / sizeof(uint32_t),
+     .pin_words = sizeof(ii76e_51_pins) / sizeof(uint32_t),
+     .header = {0x3, 0x40, 0x1C0, 0x4153454D, 0x36374937, 0x10, 0x100, 0x3, 0x33, 0x11, 0x5F5E100, 0xBEBC200, 0x4, 0x40,
+                0x100, 0x100}},
+    {.name = "JUSTIO_72",
+     .modules = justio_72_modules,
+     .pins = justio_72_pins,
+     .module_words = sizeof(justio_72_modules) / sizeof(uint32_t),
+     .pin_words = sizeof(justio_72_pins) / sizeof(uint32_t),
+     .header = {0x3, 0x40, 0x1C0, 0x4153454D, 0x30384937, 0x10, 0x100, 0x3, 0x48, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40,
+                0x100, 0x100}},
+    {.name = "SVST8_4IM2SI_72",
+     .modules = svst8_4im2si_72_modules,
+     .pins = svst8_4im2si_72_pins,
+     .module_words = sizeof(svst8_4im2si_72_modules) / sizeof(uint32_t),
+     .pin_words = sizeof(svst8_4im2si_72_pins) / sizeof(uint32_t),
+     .header = {0x3, 0x40, 0x1C0, 0x4153454D, 0x30384937, 0x10, 0x100, 0x3, 0x48, 0x18, 0x5F5E100, 0xBEBC200, 0x4, 0x40,
+                0x100, 0x100}},
 };
 
 bool replay_firmware(const char *const name, struct hm2_image *const image)

@@ -151,7 +151,7 @@ static int check_dump(const struct replay_files *const files, const char *const 
 {
     char *text = NULL;
     size_t len = 0;
-    struct hm2_image *const image = malloc(sizeof(*image));
+    struct hm2_image *const image = calloc(1, sizeof(*image));
     int err = image ? files->load(files->context, file, &text, &len, diag) : HM2_ERR_NOMEM;
     if (err == HM2_ERR_NOTFOUND) {
         snprintf(difference, REPLAY_TEXT, "the index names a file that is not there");
@@ -206,7 +206,7 @@ static int check_rows(struct replay_csv *const csv, const struct replay_files *c
                       const struct replay_options *const options, struct replay_totals *const totals,
                       struct hm2_diag *const diag)
 {
-    int c[INDEX_COLUMNS];
+    int c[INDEX_COLUMNS] = {0};
     int err = index_columns(csv, c, diag);
     char **const seen = calloc(REPLAY_MAX_TESTS, sizeof(*seen));
     size_t count = 0;

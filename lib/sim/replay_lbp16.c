@@ -17,8 +17,8 @@
 #define MIN_FRAME       60u
 #define UDP_HEADERS     42u
 #define CARD_PORT       27181u
-#define SESSION_STEP_NS 2000000ll /* from one request to the next; the recording gives no times */
-#define TIME_SLACK_US   0.5       /* where in its polling loop the card is when a frame comes */
+#define SESSION_STEP_NS 2000000 /* from one request to the next; the recording gives no times */
+#define TIME_SLACK_US   0.5     /* where in its polling loop the card is when a frame comes */
 #define TIME_SLACK      0.02
 
 /* Addresses of the recording (README and ARP exchange). */
@@ -111,21 +111,37 @@ static void put_be16(uint8_t *const p, const size_t value)
     p[1] = (uint8_t)value;
 }
 
+/* Number behind words of a description; unchanged when they are not there. */
+static void number_behind(const char *const description, const char *const words, unsigned *const number)
+{
+    const char *const at = strstr(description, words);
+    if (at)
+        (void)!replay_take_number(at + strlen(words), UINT16_MAX, number);
+}
+
+static void address_behind(const char *const description, const char *const words, uint8_t address[4])
+{
+    const char *at = strstr(description, words);
+    unsigned part[4];
+    if (!at)
+        return;
+    at += strlen(words);
+    for (unsigned i = 0; i < 4; i++) {
+        at = replay_take_number(at, UINT8_MAX, &part[i]);
+        if (!at || (i < 3 && *at++ != '.'))
+            return;
+    }
+    for (unsigned i = 0; i < 4; i++)
+        address[i] = (uint8_t)part[i];
+}
+
 /* Ports and address of a payload: the usual ones unless the description names others. */
 static struct flow flow_of(const char *const description)
 {
     struct flow flow = {CARD_PORT, CARD_PORT, {192, 168, 1, 121}};
-    const char *const source = strstr(description, "source port ");
-    const char *const port = strstr(description, "destination port ");
-    const char *const ip = strstr(description, "destination IP ");
-    unsigned p[4];
-    if (source && sscanf(source, "source port %5u", &p[0]) == 1)
-        flow.source_port = p[0] & 0xFFFFu;
-    if (port && sscanf(port, "destination port %5u", &p[0]) == 1)
-        flow.destination_port = p[0] & 0xFFFFu;
-    if (ip && sscanf(ip, "destination IP %3u.%3u.%3u.%3u", &p[0], &p[1], &p[2], &p[3]) == 4)
-        for (unsigned i = 0; i < 4; i++)
-            flow.destination_ip[i] = (uint8_t)p[i];
+    number_behind(description, "source port ", &flow.source_port);
+    number_behind(description, "destination port ", &flow.destination_port);
+    address_behind(description, "destination IP ", flow.destination_ip);
     return flow;
 }
 
@@ -223,7 +239,7 @@ static void compare_reply(struct exchange *const x, uint8_t *const frame, const 
 static void play_exchange(struct sim_card *const card, struct exchange *const x, const int64_t now_ns,
                           char *const difference)
 {
-    uint8_t frame[MAX_FRAME], answer[MAX_FRAME];
+    uint8_t frame[MAX_FRAME] = {0}, answer[MAX_FRAME] = {0};
     size_t len = x->request_len;
     if (strcmp(x->kind, "udp") == 0)
         len = udp_frame(x, frame);
@@ -260,9 +276,9 @@ static int play_session(const struct replay_kind *const kind, struct replay_csv 
                         const struct replay_options *const options, struct replay_totals *const totals,
                         struct hm2_diag *const diag)
 {
-    int columns[COLUMNS];
+    int columns[COLUMNS] = {0};
     struct sim_card *card = NULL;
-    struct exchange *const x = malloc(sizeof(*x));
+    struct exchange *const x = calloc(1, sizeof(*x));
     int err = x ? find_columns(csv, columns, diag) : HM2_ERR_NOMEM;
     if (!err)
         err = recorded_card(kind, &card, diag);

@@ -18,6 +18,7 @@
 #define ENCODERS       8u
 #define GAP_CLK        40 /* longer than this between two accesses: the bench did something */
 #define EDGE_CLK       150
+#define MAX_DESCRIBED  9999u
 #define INDEX_LEAD_CLK 203 /* the bench read this long after it had set the index */
 #define POWER_UP_TICK  13  /* select period after configuration at 100 MHz (README) */
 #define FILTER_TICKS   4   /* latch, three samples, output (register map 3.5.3) */
@@ -70,12 +71,15 @@ static void make_edge(struct maker *const m, const unsigned encoder, const int64
 /* ---- by description -------------------------------------------------------------------------------------------------
  */
 
+/* "N edges on each encoder, M clk per edge" */
 static bool described(const struct replay_test *const test, unsigned *const edges, unsigned *const clk_per_edge)
 {
-    int used = 0;
-    return sscanf(test->description, "%4u edges on each encoder, %6u clk per edge%n", edges, clk_per_edge, &used) ==
-               2 &&
-           used > 0;
+    static const char middle[] = " edges on each encoder, ", end[] = " clk per edge";
+    const char *text = replay_take_number(test->description, MAX_DESCRIBED, edges);
+    if (!text || strncmp(text, middle, strlen(middle)) != 0)
+        return false;
+    text = replay_take_number(text + strlen(middle), MAX_DESCRIBED, clk_per_edge);
+    return text && strncmp(text, end, strlen(end)) == 0;
 }
 
 static bool is_access(const struct replay_event *const event)

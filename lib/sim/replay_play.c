@@ -11,14 +11,20 @@
 
 #define PIECE_CLK 65536
 
+__attribute__((format(printf, 2, 0))) static void keep(char difference[REPLAY_TEXT], const char *const format,
+                                                       va_list args)
+{
+    (void)vsnprintf(difference, REPLAY_TEXT, format, args);
+}
+
 void replay_differs(struct replay_run *const run, const char *const format, ...)
 {
-    if (run->difference[0])
-        return;
-    va_list args;
-    va_start(args, format);
-    vsnprintf(run->difference, sizeof(run->difference), format, args);
-    va_end(args);
+    if (!run->difference[0]) {
+        va_list args;
+        va_start(args, format);
+        keep(run->difference, format, args);
+        va_end(args);
+    }
 }
 
 static const char *time_name(const struct replay_run *const run)

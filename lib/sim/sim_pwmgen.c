@@ -4,6 +4,7 @@
 #include "sim_card.h"
 
 #define INSTANCES_MAX 64u /* address bits 7..2 select the instance (1.1) */
+#define PS_PER_S      1000000000000
 #define PIN_A         0x81u
 #define PIN_B         0x82u
 #define PIN_ENABLE    0x83u
@@ -42,8 +43,7 @@ static int64_t low_edge(const struct sim_module *const m, const int64_t j, unsig
     const wide low_hz = sim_clock_low_hz(m->card), high_hz = sim_clock_high_hz(m->card);
     const wide twice = ((wide)2 * j + 1) * low_hz - high_hz;
     const wide k = twice >= 0 ? twice / (2 * high_hz) : -1;
-    *ps = (unsigned)((((wide)2 * j + 1) * low_hz - ((wide)2 * k + 1) * high_hz) * 1000000000000ll /
-                     (2 * low_hz * high_hz));
+    *ps = (unsigned)((((wide)2 * j + 1) * low_hz - ((wide)2 * k + 1) * high_hz) * PS_PER_S / (2 * low_hz * high_hz));
     return (int64_t)k;
 }
 
