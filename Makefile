@@ -244,6 +244,8 @@ install: all ## install below DESTDIR/prefix
 	ln -sf libhm2.so.$(SOVERSION) $(DESTDIR)$(libdir)/libhm2.so
 	$(INSTALL) -m 644 $(BUILDDIR)/libhm2.pc $(DESTDIR)$(libdir)/pkgconfig
 	$(INSTALL) -m 644 lib/include/hm2/*.h $(DESTDIR)$(includedir)/hm2
+	$(INSTALL) -d $(DESTDIR)$(includedir)/hm2host
+	$(INSTALL) -m 644 lib/halhost/include/*.h $(DESTDIR)$(includedir)/hm2host
 	$(INSTALL) -m 755 $(COMPONENT_SO) $(DESTDIR)$(libdir)/hm2/components
 	for page in $(MAN_PAGES); do s=$${page##*.}; $(INSTALL) -d $(DESTDIR)$(mandir)/man$$s && \
 		$(INSTALL) -m 644 $$page $(DESTDIR)$(mandir)/man$$s || exit 1; done
@@ -252,7 +254,7 @@ uninstall: ## remove what install put there
 	rm -f $(addprefix $(DESTDIR)$(bindir)/,$(TOOLS)) $(DESTDIR)$(libdir)/libhm2.a $(DESTDIR)$(libdir)/libhm2sim.a \
 		$(DESTDIR)$(libdir)/libhm2.so $(DESTDIR)$(libdir)/libhm2.so.$(SOVERSION) \
 		$(DESTDIR)$(libdir)/pkgconfig/libhm2.pc
-	rm -rf $(DESTDIR)$(includedir)/hm2 $(DESTDIR)$(libdir)/hm2
+	rm -rf $(DESTDIR)$(includedir)/hm2 $(DESTDIR)$(includedir)/hm2host $(DESTDIR)$(libdir)/hm2
 	for page in $(MAN_PAGES); do rm -f $(DESTDIR)$(mandir)/man$${page##*.}/$${page##*/}; done
 
 dist: ## source archive of the committed tree

@@ -344,6 +344,39 @@ START_TEST(termination_unloads_everything)
 }
 END_TEST
 
+/* After the first sleep, a thread that calls a function every millisecond does nothing else but sleep (and ask for the
+ * time, where that is a system call): no lock, no memory, no output. */
+START_TEST(the_thread_loop_makes_no_system_call_but_to_sleep)
+{
+    if (!process_find("strace")) {
+        printf("SKIP: strace is not installed\n");
+        return;
+    }
+    char components[512], command[1024];
+    snprintf(components, sizeof components, "%s/test-components", TEST_BUILD);
+    snprintf(command, sizeof command,
+             "strace -f -qq -o '%s' '%s' --components '%s' --run 0.5 -e 'loadrt threads name1=t' "
+             "-e 'loadrt hm2_points_test' -e 'addf points.0.update t'",
+             in_folder("trace"), process_built("hm2host"), components);
+    const char *const argv[] = {"sh", "-c", command, NULL};
+    if (process_run(&host, argv, HANG_MS) != 0 && strstr(host.text, "ptrace")) {
+        printf("SKIP: strace may not trace here: %.80s\n", host.text);
+        return;
+    }
+    ck_assert_msg(host.status == 0, "%s", host.text);
+    /* Of the thread's own lines: from its first absolute sleep to its last. The program's thread sleeps in slices of
+     * 100 ms, so the thread is the one with the most sleeps. */
+    snprintf(command, sizeof command,
+             "cd '%s' && t=$(grep clock_nanosleep trace | cut -d' ' -f1 | sort | uniq -c | sort -rn | "
+             "awk 'NR == 1 { print $2 }') && grep \"^$t \" trace | sed 's/^[0-9]* *//' | "
+             "awk '/clock_nanosleep/ { n++ } n && !/^(clock_nanosleep|clock_gettime|<... clock_nanosleep)/ && "
+             "!/^(madvise|exit|munmap|rt_sigprocmask)/ { print } END { print \"sleeps\", (n > 100) ? \"many\" : n }'",
+             folder);
+    ck_assert_int_eq(process_run(&host, argv, END_MS), 0);
+    ck_assert_str_eq(host.text, "sleeps many\n");
+}
+END_TEST
+
 START_TEST(json_is_json)
 {
     if (!process_find("python3")) {
@@ -361,6 +394,36 @@ START_TEST(json_is_json)
     const char *const argv[] = {"sh", "-c", command, NULL};
     ck_assert_int_eq(process_run(&host, argv, END_MS), 0);
     expect_text("['components', 'functions', 'parameters', 'pins', 'signals', 'threads'] ['s'] ['points.0.update']");
+}
+END_TEST
+
+/* Every option and every command is in the manual page. */
+START_TEST(the_manual_page_knows_every_option_and_command)
+{
+    static char page[65536];
+    char path[512], wanted[80];
+    snprintf(path, sizeof path, "%s/man/hm2host.1", TEST_SOURCE);
+    FILE *const file = fopen(path, "r");
+    ck_assert_ptr_nonnull(file);
+    page[fread(page, 1, sizeof page - 1, file)] = '\0';
+    fclose(file);
+    const char *const help[] = {"--help", NULL}, *const commands[] = {"-e", "help", NULL};
+    unsigned options_seen = 0, commands_seen = 0;
+    ck_assert_int_eq(run_host(help), 0);
+    for (const char *at = host.text; (at = strstr(at, "--")); at += 2) {
+        if (at[-1] != ' ' || (at[2] < 'a' || at[2] > 'z'))
+            continue;
+        snprintf(wanted, sizeof wanted, "Fl Fl %.*s", (int)strcspn(at + 2, " "), at + 2);
+        ck_assert_msg(strstr(page, wanted) != NULL, "no '%s' in the manual page", wanted);
+        options_seen++;
+    }
+    ck_assert_int_eq(run_host(commands), 0);
+    for (char *line = strtok(host.text, "\n"); line; line = strtok(NULL, "\n"), commands_seen++) {
+        snprintf(wanted, sizeof wanted, "Ic %.*s", (int)strcspn(line + 2, " "), line + 2);
+        ck_assert_msg(strstr(page, wanted) != NULL, "no '%s' in the manual page", wanted);
+    }
+    ck_assert_uint_ge(options_seen, 13);
+    ck_assert_uint_ge(commands_seen, 40);
 }
 END_TEST
 
@@ -667,7 +730,9 @@ int main(void)
     tcase_add_test(tests, a_function_that_hangs_ends_the_program_with_its_name);
     tcase_add_test(tests, an_interrupt_ends_run_and_the_file_goes_on);
     tcase_add_test(tests, termination_unloads_everything);
+    tcase_add_test(tests, the_thread_loop_makes_no_system_call_but_to_sleep);
     tcase_add_test(tests, json_is_json);
+    tcase_add_test(tests, the_manual_page_knows_every_option_and_command);
     tcase_add_test(tests, the_prompt_completes_and_remembers);
     tcase_add_loop_test(tests, components_of_linuxcnc_load_run_and_unload, 0, COUNT(linuxcnc_components));
     tcase_add_test(tests, the_mesa_driver_of_linuxcnc_loads_and_unloads);

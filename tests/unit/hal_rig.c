@@ -78,7 +78,27 @@ static void probe_exit(void *const block)
 {
     (void)block;
     probe_exits++;
+    strcat(probe_order, "p");
     hal_exit(probe_id);
+}
+
+/* A second component, to see in which order they go. */
+char probe_order[16];
+
+static int tail_id;
+
+static int tail_main(void *const block)
+{
+    (void)block;
+    tail_id = hal_init("tail");
+    return tail_id < 0 ? tail_id : hal_ready(tail_id);
+}
+
+static void tail_exit(void *const block)
+{
+    (void)block;
+    strcat(probe_order, "t");
+    hal_exit(tail_id);
 }
 
 static const struct halhost_parameter parameters[] = {
@@ -103,6 +123,7 @@ static const struct halhost_builtin builtins[] = {
         .main = probe_main,
         .exit = probe_exit,
     },
+    {.name = "tail", .main = tail_main, .exit = tail_exit},
 };
 
 /* ---- rig -------------------------------------------------------------------------------------------------------- */
@@ -161,6 +182,7 @@ int hal_rig_open(void **const state)
     messages[0] = output[0] = '\0';
     messages_used = output_used = 0;
     probe_mains = probe_exits = 0;
+    probe_order[0] = '\0';
     probe_hook = NULL;
     hm2_diag_clear(&diag);
     session = hal_session_new(&options);

@@ -39,6 +39,7 @@ struct probe_arguments {
 extern struct probe_arguments probe_seen; /* as the last load saw them; texts are copied to probe_texts */
 extern char probe_texts[3][64];
 extern unsigned probe_mains, probe_exits;
+extern char probe_order[16]; /* exits so far: 'p' of probe, 't' of the second component, "tail" */
 
 struct probe {
     hal_float_t *in, *out;

@@ -631,6 +631,20 @@ static void unloading_frees_pins_links_and_functions(void **state)
     assert_string_equal(hal_rig_run("loadrt threads name1=t\naddf probe.0 t\n"), "");
 }
 
+static void components_go_in_reverse_order(void **state)
+{
+    (void)state;
+    assert_string_equal(hal_rig_run("loadrt probe\nloadrt tail\nunloadrt all\n"), "");
+    assert_string_equal(probe_order, "tp");
+    assert_string_equal(hal_rig_run("loadrt tail\nloadrt probe\nloadrt threads name1=t\naddf probe.0 t\nstart\n"), "");
+    wait_for_cycles(3);
+    /* The same when the host comes down with threads running, as after an error. */
+    struct hm2_diag diag = {0};
+    assert_int_equal(halhost_close(&diag), 0);
+    assert_string_equal(probe_order, "tppt");
+    assert_int_equal(diag.problems, 0);
+}
+
 /* ---- RTAPI ------------------------------------------------------------------------------------------------------ */
 
 static void texts_are_split_at_blanks(void **state)
@@ -805,6 +819,7 @@ int main(void)
         RIG(bad_module_parameters_are_refused_before_anything_runs),
         RIG(a_failed_load_leaves_nothing),
         RIG(unloading_frees_pins_links_and_functions),
+        RIG(components_go_in_reverse_order),
         RIG(texts_are_split_at_blanks),
         RIG(small_calls_do_what_their_names_say),
         RIG(shared_memory_is_found_by_its_key),
