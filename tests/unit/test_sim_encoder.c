@@ -316,6 +316,57 @@ static void a_probe_edge_latches_and_disarms(void **state)
     sim_card_free(card);
 }
 
+static void start_stepgen(struct sim_card *const card, const int64_t clk, const uint32_t rate)
+{
+    sim_card_write(card, clk, 0x2900, UINT32_MAX);
+    sim_card_write(card, clk + 1, 0x2500, 10);
+    sim_card_write(card, clk + 2, 0x2600, 10);
+    sim_card_write(card, clk + 3, 0x2000, rate);
+}
+
+/* ---- samples of a DPLL timer
+ * ---------------------------------------------------------------------------------------------- */
+
+#define DPLL_PERIOD_CLK 100000
+
+static struct sim_card *card_with_dpll(const bool selected)
+{
+    struct sim_card *const card = new_card(NULL, "7i96s");
+    sim_card_write(card, 10, 0x7000, 0x02AF31DC); /* 2^42 / (base rate / 1) = some 98 thousand clocks */
+    sim_card_write(card, 11, 0x7200, 0x01FFFFFF);
+    sim_card_write(card, 12, 0x7400, 0x00004000);
+    assert_int_equal(sim_card_follow(card, 0, 0, 4, 1), 0);
+    start_stepgen(card, 20, 4294967u);                       /* a step per 1000 clocks, a count per 250 */
+    sim_card_write(card, 40, 0x3500, selected ? 0x9000 : 0); /* timer 1 */
+    return card;
+}
+
+static void counts_are_those_of_the_selected_timer_s_last_rise(void **state)
+{
+    (void)state;
+    struct sim_card *const sampled = card_with_dpll(true), *const live = card_with_dpll(false);
+    assert_int_equal(sim_card_read(sampled, 50, 0x3500, NULL), 0x9000);
+    unsigned rises = 0;
+    int64_t last = INT64_MIN;
+    for (int64_t clk = 3 * DPLL_PERIOD_CLK; clk < 12 * DPLL_PERIOD_CLK; clk += 33333) {
+        sim_card_advance(sampled, clk);
+        const int64_t rise = sim_dpll_last_rise(sampled, 1, clk - 1);
+        assert_true(rise > 0 && clk - rise < 2 * DPLL_PERIOD_CLK);
+        const uint32_t got = sim_card_read(sampled, clk, 0x3000, NULL);
+        const uint32_t stamp = sim_card_read(sampled, clk, 0x3300, NULL) & 0xFFFFu;
+        if (rise == last)
+            continue;
+        last = rise;
+        rises++;
+        const uint32_t expected = sim_card_read(live, rise + 2, 0x3000, NULL); /* live reads are a clock late */
+        assert_int_equal(got & 0xFFFFu, expected & 0xFFFFu);
+        assert_int_equal(stamp, sim_card_read(live, rise + 2, 0x3300, NULL) & 0xFFFFu);
+    }
+    assert_true(rises >= 6);
+    sim_card_free(sampled);
+    sim_card_free(live);
+}
+
 /* ---- followers
  * ----------------------------------------------------------------------------------------------------------- */
 
@@ -325,14 +376,6 @@ static int16_t count_of(struct sim_card *const card, const int64_t clk, uint16_t
     if (stamp)
         *stamp = (uint16_t)(data >> 16);
     return (int16_t)data;
-}
-
-static void start_stepgen(struct sim_card *const card, const int64_t clk, const uint32_t rate)
-{
-    sim_card_write(card, clk, 0x2900, UINT32_MAX);
-    sim_card_write(card, clk + 1, 0x2500, 10);
-    sim_card_write(card, clk + 2, 0x2600, 10);
-    sim_card_write(card, clk + 3, 0x2000, rate);
 }
 
 static void an_encoder_follows_its_step_generator_with_floor(void **state)
@@ -406,6 +449,7 @@ int main(void)
         cmocka_unit_test(dividers_tick_as_their_down_counters_do),
         cmocka_unit_test(the_newer_firmware_clears_a_quadrature_error_by_writing_one),
         cmocka_unit_test(a_probe_edge_latches_and_disarms),
+        cmocka_unit_test(counts_are_those_of_the_selected_timer_s_last_rise),
         cmocka_unit_test(an_encoder_follows_its_step_generator_with_floor),
         cmocka_unit_test(a_follower_s_time_stamps_give_its_speed),
         cmocka_unit_test(following_needs_what_the_card_has),
