@@ -91,7 +91,7 @@ static void print_cycle_times(int64_t *const read_ns, int64_t *const write_ns, c
 
 /* ---- the driver under test --------------------------------------------------------------------------------------- */
 
-static void print_message(void *const context, const enum halhost_stream stream, const char *const text)
+static void print_message(const void *const context, const enum halhost_stream stream, const char *const text)
 {
     (void)context;
     (void)stream;
