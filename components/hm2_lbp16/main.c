@@ -91,11 +91,13 @@ static void card_read_request(void *const arg, const long period)
 static void card_read(void *const arg, const long period)
 {
     struct card *const card = arg;
-    card->thread = rtapi_task_self();
-    if (!hm2_board_request_outstanding(card->board))
-        request_all(card, period);
+    if (card_count > 1) {
+        card->thread = rtapi_task_self();
+        if (!hm2_board_request_outstanding(card->board))
+            request_all(card, period);
+        card->cycle++;
+    }
     hm2_board_read(card->board, period);
-    card->cycle++;
 }
 
 static void card_write(void *const arg, const long period)

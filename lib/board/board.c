@@ -54,10 +54,10 @@ const char *hm2_board_prefix(const struct hm2_board *const board)
 
 void board_start_modules(struct hm2_board *const board)
 {
-    const struct hm2_cycle cycle = board_cycle(board, board->request_ns, false);
+    const struct hm2_cycle *const cycle = board_cycle(board, board->request_ns, false);
     for (unsigned i = 0; i < board->module_count; i++)
         if (board->modules[i].type->start)
-            board->modules[i].type->start(&board->modules[i], &cycle);
+            board->modules[i].type->start(&board->modules[i], cycle);
 }
 
 /* Ask and wait for the fresh reply. */

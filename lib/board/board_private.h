@@ -116,6 +116,15 @@ enum board_bite_word { BOARD_BITE_REASON, BOARD_BITE_GAP_US, BOARD_BITE_PERIOD_U
 
 enum board_bite_reason { BOARD_BITE_UNKNOWN, BOARD_BITE_PACKET_LOSS, BOARD_BITE_LATE_WRITE };
 
+/* What the cycle calls: only functions that exist, of modules that are in use. */
+struct board_calls {
+    unsigned count;
+    struct board_call {
+        void (*function)(struct hm2_module *module, const struct hm2_cycle *cycle);
+        struct hm2_module *module;
+    } call[BOARD_MODULES];
+};
+
 enum board_state { BOARD_NEW, BOARD_IDENTIFIED, BOARD_SET_UP, BOARD_RUNS, BOARD_STOPPED };
 
 struct hm2_board {
@@ -135,12 +144,14 @@ struct hm2_board {
     unsigned module_count;
     struct hm2_module modules[BOARD_MODULES]; /* in the order of hm2_module_types[] */
     struct hm2_module *watchdog;              /* NULL = the firmware has none */
+    struct board_calls unpacks, packs;
     struct hm2_plan *plan;
     struct board_points *points;
 
     /* the cycle */
     bool outstanding, sent; /* a request waits for read(); it could be sent */
     int64_t request_ns, period_ns;
+    struct hm2_cycle cycle;   /* as the modules are told */
     uint32_t writes;          /* since start() or since the card came back */
     int64_t write_ns;         /* when the last write was sent, valid with writes > 0 */
     int64_t write_gap_ns;     /* longest time between two writes since the last good reply */
@@ -185,6 +196,7 @@ void board_recovery_identified(struct hm2_board *board);
 void board_recovery_end(struct hm2_board *board);
 
 void board_start_modules(struct hm2_board *board);
-struct hm2_cycle board_cycle(const struct hm2_board *board, int64_t now_ns, bool bitten);
+/* Facts of the present cycle; valid until the next call. */
+const struct hm2_cycle *board_cycle(struct hm2_board *board, int64_t now_ns, bool bitten);
 
 #endif

@@ -20,15 +20,23 @@ static void count(hm2_u32_t *const pin)
     *pin = *pin + 1u;
 }
 
-struct hm2_cycle board_cycle(const struct hm2_board *const board, const int64_t now_ns, const bool bitten)
+const struct hm2_cycle *board_cycle(struct hm2_board *const board, const int64_t now_ns, const bool bitten)
 {
-    return (struct hm2_cycle){
-        .now_ns = now_ns,
-        .period_ns = board->period_ns,
-        .period_s = (double)board->period_ns * 1e-9,
-        .writes = board->writes,
-        .bitten = bitten,
-    };
+    struct hm2_cycle *const cycle = &board->cycle;
+    if (cycle->period_ns != board->period_ns) {
+        cycle->period_ns = board->period_ns;
+        cycle->period_s = (double)board->period_ns * 1e-9;
+    }
+    cycle->now_ns = now_ns;
+    cycle->writes = board->writes;
+    cycle->bitten = bitten;
+    return cycle;
+}
+
+static void call_all(const struct board_calls *const calls, const struct hm2_cycle *const cycle)
+{
+    for (const struct board_call *call = calls->call, *const end = call + calls->count; call < end; call++)
+        call->function(call->module, cycle);
 }
 
 /* ---- request ------------------------------------------------------------------------------------------------------
@@ -95,14 +103,14 @@ static bool judge_identity(struct hm2_board *const board, const size_t len)
     return fresh;
 }
 
-static bool receive(struct hm2_board *const board)
+static bool receive(struct hm2_board *const board, int64_t clock_ns)
 {
     const bool identity = board->recovery == BOARD_ASKS_IDENTITY;
     uint8_t *const buffer = identity ? board->identity.reply : hm2_plan_reply_buffer(board->plan);
     const size_t capacity = identity ? sizeof board->identity.reply : hm2_plan_reply_capacity(board->plan);
     const int64_t deadline_ns = board->request_ns + board_read_limit_ns(*board->points->read_timeout, board->period_ns);
-    for (unsigned i = 0; i < BOARD_MAX_DATAGRAMS; i++) {
-        const int len = link_recv(board->link, buffer, capacity, deadline_ns);
+    for (unsigned i = 0; i < BOARD_MAX_DATAGRAMS; i++, clock_ns = LINK_CLOCK_UNREAD) {
+        const int len = link_recv_from(board->link, buffer, capacity, deadline_ns, clock_ns);
         if (len == HM2_ERR_TIMEOUT)
             return false;
         if (len == HM2_ERR_NOSPACE)
@@ -117,12 +125,13 @@ static void measure_round_trip(struct hm2_board *const board)
 {
     const struct board_points *const p = board->points;
     const double us = (double)(link_now_ns(board->link) - board->request_ns) * 1e-3;
+    *p->rtt_us = us;
     if (*p->rtt_reset || !board->rtt_known) {
         *p->rtt_reset = false;
         board->rtt_known = true;
         *p->rtt_min_us = *p->rtt_max_us = us;
+        return;
     }
-    *p->rtt_us = us;
     if (us < *p->rtt_min_us)
         *p->rtt_min_us = us;
     if (us > *p->rtt_max_us)
@@ -137,10 +146,7 @@ static void note_loss(struct hm2_board *const board)
 
 static void unpack_all(struct hm2_board *const board)
 {
-    const struct hm2_cycle cycle = board_cycle(board, board->request_ns, hm2_watchdog_bitten(board->watchdog));
-    for (unsigned i = 0; i < board->module_count; i++)
-        if (board->modules[i].type->unpack)
-            board->modules[i].type->unpack(&board->modules[i], &cycle);
+    call_all(&board->unpacks, board_cycle(board, board->request_ns, hm2_watchdog_bitten(board->watchdog)));
     *board->points->data_age = 0;
 }
 
@@ -193,13 +199,16 @@ void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
             give_up(board);
         return;
     }
-    if (!board->outstanding)
+    int64_t clock_ns = LINK_CLOCK_UNREAD;
+    if (!board->outstanding) {
         hm2_board_request(board, period_ns);
+        clock_ns = board->request_ns;
+    }
     const struct board_points *const p = board->points;
     board->cycles++;
     count(p->data_age);
     *p->strangers = (uint32_t)__atomic_load_n(&board->link->counters.strangers, __ATOMIC_RELAXED);
-    if (!board->sent || !receive(board)) {
+    if (!board->sent || !receive(board, clock_ns)) {
         give_up(board);
         count(p->lost);
         note_loss(board);
@@ -228,10 +237,7 @@ void hm2_board_write(struct hm2_board *const board, const int64_t period_ns)
     board->period_ns = period_ns > 0 ? period_ns : DEFAULT_PERIOD_NS;
     board->notices.now_ns = now_ns;
     /* A card that comes back drives nothing until a person has seen it. */
-    const struct hm2_cycle cycle = board_cycle(board, now_ns, restores || hm2_watchdog_bitten(board->watchdog));
-    for (unsigned i = 0; i < board->module_count; i++)
-        if (board->modules[i].type->pack)
-            board->modules[i].type->pack(&board->modules[i], &cycle);
+    call_all(&board->packs, board_cycle(board, now_ns, restores || hm2_watchdog_bitten(board->watchdog)));
     size_t len;
     const uint8_t *const bytes = hm2_plan_write(board->plan, &len);
     if (board->writes > 0 && now_ns - board->write_ns > board->write_gap_ns)

@@ -244,6 +244,22 @@ static int setup_modules(struct hm2_board *const board, struct hm2_setup *const 
     return err;
 }
 
+static void add_call(struct board_calls *const calls, struct hm2_module *const module,
+                     void (*const function)(struct hm2_module *module, const struct hm2_cycle *cycle))
+{
+    if (function && module->context)
+        calls->call[calls->count++] = (struct board_call){function, module};
+}
+
+static void list_calls(struct hm2_board *const board)
+{
+    for (unsigned i = 0; i < board->module_count; i++) {
+        struct hm2_module *const module = &board->modules[i];
+        add_call(&board->unpacks, module, module->type->unpack);
+        add_call(&board->packs, module, module->type->pack);
+    }
+}
+
 static int create_objects(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
 {
     struct hm2_setup setup = {
@@ -267,6 +283,7 @@ static int create_objects(struct hm2_board *const board, struct hm2_binder *cons
         err = setup_modules(board, &setup);
     if (err == 0)
         err = hm2_plan_freeze(board->plan, diag);
+    list_calls(board);
     return err;
 }
 

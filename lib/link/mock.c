@@ -68,11 +68,13 @@ static struct queued *earliest(struct mock *const mock)
     return first;
 }
 
-static int mock_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns)
+static int mock_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns,
+                     const int64_t clock_ns)
 {
     struct mock *const mock = (struct mock *)link;
     struct queued *const entry = earliest(mock);
     const int64_t limit_ns = deadline_ns > mock->now_ns ? deadline_ns : mock->now_ns;
+    (void)clock_ns; /* time is virtual */
     if (!entry || entry->arrival_ns > limit_ns) {
         mock->now_ns = limit_ns;
         return HM2_ERR_TIMEOUT;

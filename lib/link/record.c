@@ -68,10 +68,11 @@ static int record_send(struct link *const link, const void *const data, const si
     return err;
 }
 
-static int record_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns)
+static int record_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns,
+                       const int64_t clock_ns)
 {
     struct record *const record = (struct record *)link;
-    const int len = link_recv(record->inner, data, cap, deadline_ns);
+    const int len = link_recv_from(record->inner, data, cap, deadline_ns, clock_ns);
     if (len >= 0)
         write_line(record, elapsed_ns(record), '<', data, (size_t)len);
     else if (len == HM2_ERR_NOSPACE)

@@ -63,11 +63,12 @@ static int udp_send(struct link *const link, const void *const data, const size_
 }
 
 /* Wait until something can be received. False when the deadline is over; then nothing was waited for. */
-static bool wait_until(struct udp *const udp, const int64_t deadline_ns)
+static bool wait_until(struct udp *const udp, const int64_t deadline_ns, const int64_t clock_ns)
 {
     struct pollfd ready = {.fd = udp->fd, .events = POLLIN};
-    for (;;) {
-        const int64_t now_ns = udp_now(&udp->base);
+    for (int64_t now_ns = clock_ns;; now_ns = LINK_CLOCK_UNREAD) {
+        if (now_ns == LINK_CLOCK_UNREAD)
+            now_ns = udp_now(&udp->base);
         if (deadline_ns <= now_ns)
             return false;
         const int64_t left_ns = deadline_ns - now_ns;
@@ -90,15 +91,17 @@ static int64_t busy_end(struct udp *const udp, const int64_t deadline_ns)
     return end_ns < deadline_ns ? end_ns : deadline_ns;
 }
 
-static int udp_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns)
+static int udp_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns,
+                    int64_t clock_ns)
 {
     struct udp *const udp = (struct udp *)link;
     /* An ICMP error takes the place of a datagram and may hide one behind it; a few of them are passed over even after
      * the deadline. */
     unsigned passes_after_deadline = 4;
     const int64_t busy_until_ns = busy_end(udp, deadline_ns);
-    for (;;) {
-        const bool in_time = (udp->busy_ns > 0 && udp_now(link) < busy_until_ns) || wait_until(udp, deadline_ns);
+    for (;; clock_ns = LINK_CLOCK_UNREAD) {
+        const bool in_time =
+            (udp->busy_ns > 0 && udp_now(link) < busy_until_ns) || wait_until(udp, deadline_ns, clock_ns);
         const ssize_t len = recv(udp->fd, data, cap, MSG_DONTWAIT | MSG_TRUNC);
         if (len >= 0) {
             link->counters.received++;

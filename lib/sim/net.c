@@ -250,10 +250,12 @@ static void settle_card(struct sim_net *const net)
     sim_card_advance(net->card, sim_card_clock_at(net->card, net->now_ns));
 }
 
-static int net_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns)
+static int net_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns,
+                    const int64_t clock_ns)
 {
     struct sim_net *const net = (struct sim_net *)link;
     const int64_t limit_ns = deadline_ns > net->now_ns ? deadline_ns : net->now_ns;
+    (void)clock_ns; /* time is virtual */
     while (net->inbox_count == 0 && step(net, limit_ns)) {
     }
     if (net->inbox_count == 0) {

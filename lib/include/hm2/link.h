@@ -22,13 +22,17 @@
 
 struct link;
 
+#define LINK_CLOCK_UNREAD INT64_MIN
+
 struct link_ops {
     /* Send one datagram. 0, HM2_ERR_IO, HM2_ERR_NOSPACE (longer than LINK_MAX_DATAGRAM_BYTES). */
     int (*send)(struct link *link, const void *data, size_t len);
     /* Receive one datagram that comes from the device. Returns its length (0..cap), HM2_ERR_TIMEOUT when none came
      * before deadline_ns, HM2_ERR_IO, HM2_ERR_NOSPACE when it was longer than cap (it is consumed). A deadline in
-     * the past returns what is queued already. */
-    int (*recv)(struct link *link, void *data, size_t cap, int64_t deadline_ns);
+     * the past returns what is queued already. clock_ns is what the caller has just read from the link's clock, or
+     * LINK_CLOCK_UNREAD: a link may take it for the present time once instead of reading the clock again, and then
+     * waits longer by as much as it is old. */
+    int (*recv)(struct link *link, void *data, size_t cap, int64_t deadline_ns, int64_t clock_ns);
     int64_t (*now_ns)(struct link *link);
     void (*close)(struct link *link); /* releases everything, the link itself included */
 };
@@ -55,7 +59,13 @@ static inline int HM2_MUST_CHECK link_send(struct link *const link, const void *
 static inline int HM2_MUST_CHECK link_recv(struct link *const link, void *const data, const size_t cap,
                                            const int64_t deadline_ns)
 {
-    return link->ops->recv(link, data, cap, deadline_ns);
+    return link->ops->recv(link, data, cap, deadline_ns, LINK_CLOCK_UNREAD);
+}
+
+static inline int HM2_MUST_CHECK link_recv_from(struct link *const link, void *const data, const size_t cap,
+                                                const int64_t deadline_ns, const int64_t clock_ns)
+{
+    return link->ops->recv(link, data, cap, deadline_ns, clock_ns);
 }
 
 static inline int64_t link_now_ns(struct link *const link)

@@ -84,7 +84,8 @@ struct hm2_module_type {
     int config_count;     /* enum hm2_config_count or -1 when the number cannot be configured */
     bool clamp_count;     /* a configured number above the firmware's is clamped with a warning */
     /* Claim pins, bind points, add registers; sets module->context (memory from the binder). module->instances is
-     * already the number to use; 0 = present but not used (setup is called all the same). */
+     * already the number to use; 0 = present but not used (setup is called all the same). A board calls unpack() and
+     * pack() only of modules that have a context. */
     int (*setup)(struct hm2_module *module, struct hm2_setup *setup);
     /* The first reply after load, or after the card came back from a power cycle, is in the windows: take present
      * counter values as the start, so that positions neither jump nor lose what they had. May be NULL. */
