@@ -135,7 +135,13 @@ static double loop_khz(const struct hm2_module *const module, const struct hm2_c
 /* False for a NaN: what cannot be used is kept as NaN, and so reported in every cycle. */
 static bool same(const double a, const double b)
 {
-    return a <= b && a >= b;
+    return a == b;
+}
+
+/* In the same way what exceeds its limit is kept as something else. */
+static uint32_t seen(const uint32_t value, const uint32_t limit)
+{
+    return value <= limit ? value : ~value;
 }
 
 /* The accumulator of dds_size bits gains base_rate every prescale clocks and overflows once a period. */
@@ -145,14 +151,15 @@ static void set_rate(const struct hm2_module *const module, const struct hm2_cyc
     const double khz = loop_khz(module, cycle);
     ctx->for_khz = same(*ctx->base_freq_khz, khz) ? khz : NAN;
     ctx->for_dds_size = *ctx->dds_size;
-    ctx->for_plimit = *ctx->plimit;
+    const uint32_t plimit = *ctx->plimit;
+    ctx->for_plimit = seen(plimit, PLIMIT_MAX);
     const uint32_t bits = ctx->for_dds_size >= 32u && ctx->for_dds_size <= 62u ? ctx->for_dds_size : DDS_BITS;
     const double span = (double)((uint64_t)1 << bits);
     const uint32_t wanted = hm2_trunc_u32(1073741824.0 * ctx->clock_hz / (span * khz * 1000.0));
     const uint32_t prescale = wanted < 1 ? 1 : wanted > PRESCALE_MAX ? PRESCALE_MAX : wanted;
     *ctx->prescale = prescale;
     hm2_section_set(&ctx->base_rate, 0, hm2_trunc_u32(khz * 1000.0 * span * prescale / ctx->clock_hz));
-    hm2_section_set(&ctx->control0, 0, prescale << 24 | limited(module, ctx->for_plimit, PLIMIT_MAX));
+    hm2_section_set(&ctx->control0, 0, prescale << 24 | limited(module, plimit, PLIMIT_MAX));
 }
 
 /* An advance in 1/65536 periods (register map 3.15); through a signed type, the usual offset is negative. */
@@ -175,8 +182,9 @@ static void set_registers(const struct hm2_module *const module, const struct hm
     uint32_t value[TIMERS];
     set_rate(module, cycle);
     ctx->for_period_ns = cycle->period_ns;
-    ctx->for_time_const = *ctx->time_const;
-    hm2_section_set(&ctx->control1, 0, limited(module, ctx->for_time_const, TIME_CONST_MAX) << 16);
+    const uint32_t time_const = *ctx->time_const;
+    ctx->for_time_const = seen(time_const, TIME_CONST_MAX);
+    hm2_section_set(&ctx->control1, 0, limited(module, time_const, TIME_CONST_MAX) << 16);
     for (unsigned i = 0; i < TIMERS; i++)
         value[i] = timer_value(module, i, per_us);
     hm2_section_set(&ctx->timers12, 0, value[1] << 16 | value[0]);
@@ -185,13 +193,14 @@ static void set_registers(const struct hm2_module *const module, const struct hm
 
 static bool is_unchanged(const struct dpll *const ctx, const struct hm2_cycle *const cycle)
 {
-    bool unchanged = cycle->period_ns == ctx->for_period_ns && *ctx->plimit == ctx->for_plimit &&
-                     *ctx->time_const == ctx->for_time_const && *ctx->dds_size == ctx->for_dds_size &&
-                     ctx->for_plimit <= PLIMIT_MAX && ctx->for_time_const <= TIME_CONST_MAX &&
-                     same(*ctx->base_freq_khz, ctx->for_khz);
-    for (unsigned i = 0; i < TIMERS; i++)
-        unchanged = unchanged && same(*ctx->timer[i].offset_us, ctx->timer[i].for_us);
-    return unchanged;
+    const uint32_t words = (*ctx->plimit ^ ctx->for_plimit) | (*ctx->time_const ^ ctx->for_time_const) |
+                           (*ctx->dds_size ^ ctx->for_dds_size);
+    if (words != 0 || cycle->period_ns != ctx->for_period_ns || !same(*ctx->base_freq_khz, ctx->for_khz))
+        return false;
+    for (const struct timer *timer = ctx->timer; timer < ctx->timer + TIMERS; timer++)
+        if (!same(*timer->offset_us, timer->for_us))
+            return false;
+    return true;
 }
 
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)

@@ -6,8 +6,9 @@
  * A pad is driven when its open drain bit is set and the data are 0, whatever the direction says (tests/data/ioport),
  * so polarity and source are written before open drain, and the direction last.
  *
- * Pins act in every cycle. Parameters cannot be linked to signals, only a person sets them; a few I/Os are looked at in
- * each cycle, and when one has changed, all of them.
+ * Pins act in every cycle, as far as they can: the data of an input reach no pad, so `out` is read of pins only that
+ * have been outputs, from the very write on that makes them so. Parameters cannot be linked to signals, only a person
+ * sets them; a few I/Os are looked at in each cycle, and when one has changed, all of them.
  */
 #include <stdio.h>
 
@@ -17,7 +18,7 @@
 
 enum { REG_DATA, REG_DIRECTION, REG_ALT_SOURCE, REG_OPEN_DRAIN, REG_INVERT };
 
-#define LOOKS_PER_CYCLE 8u /* I/Os whose parameters are looked at in a cycle */
+#define LOOKS_PER_CYCLE 4u /* I/Os whose parameters are looked at in a cycle */
 
 struct gpio_out {
     hm2_bit_t *out;
@@ -33,15 +34,15 @@ struct io_setup {
 
 /* One word per register and port, bit = I/O of the port. */
 struct port {
-    uint32_t present;              /* bits of the width */
-    uint32_t gpio;                 /* not owned by a module */
-    unsigned gpio_first, gpio_end; /* bits from the lowest to behind the highest of gpio; equal when there is none */
-    uint32_t outputs;              /* outputs of modules */
-    uint32_t immediate;            /* those of them that are driven from load on */
-    uint32_t shown;                /* levels as the pins have them */
+    uint32_t present;                              /* bits of the width */
+    uint32_t gpio;                                 /* not owned by a module */
+    uint32_t driven;                               /* those of them that are outputs, or have been */
+    uint32_t outputs;                              /* outputs of modules */
+    uint32_t immediate;                            /* those of them that are driven from load on */
+    uint32_t shown;                                /* levels as the pins have them */
     uint32_t is_output, invert_output, open_drain; /* what the parameters say */
     struct hm2_level *levels;
-    struct gpio_out *out; /* of other pins on a constant 0 */
+    struct gpio_out *out; /* of the bits in gpio */
 };
 
 struct ioport {
@@ -164,12 +165,8 @@ static int bind_io(const struct hm2_setup *const setup, struct ioport *const ctx
     const uint32_t mask = 1u << bit;
     int err = hm2_bind_group(setup, &groups[GROUP_LEVEL], &port->levels[bit], io);
     port->present |= mask;
-    if (pin->owner) {
-        port->out[bit].out = &ctx->nothing;
-    } else if (err == 0) {
+    if (!pin->owner && err == 0) {
         port->gpio |= mask;
-        port->gpio_first = port->gpio == mask ? bit : port->gpio_first;
-        port->gpio_end = bit + 1;
         err = hm2_bind_group(setup, &groups[GROUP_OUT], &port->out[bit], io);
     }
     if (pin->owner && is_output(pin)) {
@@ -258,21 +255,41 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 
 /* ---- cycle ------------------------------------------------------------------------------------------------------ */
 
-static void unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
+static void show_all(const struct ioport *const ctx)
 {
-    struct ioport *const ctx = module->context;
-    (void)cycle;
     for (unsigned number = 0; number < ctx->count; number++) {
-        struct port *const port = &ctx->ports[number];
-        const uint32_t levels = hm2_window_get(&ctx->read, number);
-        const uint32_t turn = number == ctx->turn_port ? HM2_TURN_MASK(ctx->turn) : 0;
-        hm2_show_levels(port->levels, levels, ((levels ^ port->shown) | turn) & port->present);
-        port->shown = levels;
+        const struct port *const port = &ctx->ports[number];
+        hm2_show_levels(port->levels, port->shown, port->present);
     }
+}
+
+/* The next few levels are written whether they changed or not. */
+static void take_turn(struct ioport *const ctx)
+{
+    const struct port *const port = &ctx->ports[ctx->turn_port];
+    hm2_show_levels(port->levels, port->shown, HM2_TURN_MASK(ctx->turn) & port->present);
     if (++ctx->turn >= ctx->turns) {
         ctx->turn = 0;
         ctx->turn_port = ctx->turn_port + 1 < ctx->count ? ctx->turn_port + 1 : 0;
     }
+}
+
+static void unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
+{
+    struct ioport *const ctx = module->context;
+    const uint8_t *word = ctx->read.bytes;
+    for (struct port *port = ctx->ports, *const end = port + ctx->count; port < end; port++, word += 4) {
+        const uint32_t levels = hm2_get_le32(word);
+        const uint32_t changed = (levels ^ port->shown) & port->present;
+        if (changed) {
+            hm2_show_levels(port->levels, levels, changed);
+            port->shown = levels;
+        }
+    }
+    if (cycle->writes == 0)
+        show_all(ctx); /* links of the HAL file that loaded us are new */
+    else
+        take_turn(ctx);
 }
 
 /* The first reply: every pin. */
@@ -280,11 +297,9 @@ static void start(struct hm2_module *const module, const struct hm2_cycle *const
 {
     struct ioport *const ctx = module->context;
     (void)cycle;
-    for (unsigned number = 0; number < ctx->count; number++) {
-        struct port *const port = &ctx->ports[number];
-        port->shown = hm2_window_get(&ctx->read, number);
-        hm2_show_levels(port->levels, port->shown, port->present);
-    }
+    for (unsigned number = 0; number < ctx->count; number++)
+        ctx->ports[number].shown = hm2_window_get(&ctx->read, number);
+    show_all(ctx);
 }
 
 static uint8_t look(const struct io_setup *const row)
@@ -307,6 +322,7 @@ static void take_parameters(struct ioport *const ctx)
         port->invert_output |= (row->seen & 1u) << row->bit;
         port->open_drain |= (row->seen >> 1 & 1u) << row->bit;
         port->is_output |= (row->seen >> 2 & 1u) << row->bit;
+        port->driven |= port->is_output;
     }
     for (unsigned number = 0; number < ctx->count; number++)
         apply(ctx, number);
@@ -326,18 +342,26 @@ static bool parameters_changed(struct ioport *const ctx)
 
 static uint32_t outputs(const struct port *const port)
 {
-    const struct gpio_out *const first = port->out + port->gpio_first;
     uint32_t data = 0;
-    for (const struct gpio_out *at = port->out + port->gpio_end; at > first; at--)
-        data = data << 1 | *at[-1].out;
-    return data << port->gpio_first;
+    for (uint32_t left = port->driven; left; left &= left - 1) {
+        const unsigned bit = (unsigned)__builtin_ctz(left);
+        data |= (uint32_t)*port->out[bit].out << bit;
+    }
+    return data;
+}
+
+static void write_data(struct ioport *const ctx)
+{
+    for (unsigned number = 0; number < ctx->count; number++) {
+        const struct port *const port = &ctx->ports[number];
+        if (port->driven)
+            hm2_window_set(&ctx->write, number, outputs(port));
+    }
 }
 
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct ioport *const ctx = module->context;
-    for (unsigned number = 0; number < ctx->count; number++)
-        hm2_window_set(&ctx->write, number, outputs(&ctx->ports[number]));
     if (cycle->writes == 0 || cycle->bitten != ctx->held_off) {
         ctx->first_written = true;
         ctx->held_off = cycle->bitten;
@@ -345,6 +369,7 @@ static void pack(struct hm2_module *const module, const struct hm2_cycle *const 
     } else if (parameters_changed(ctx)) {
         take_parameters(ctx);
     }
+    write_data(ctx);
 }
 
 static const struct hm2_md_variant variants[] = {

@@ -1,22 +1,21 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* User LEDs of the card (register map 3.3, hal-interface 2.5): one write-only word, LED CR01 in bit 31. */
 #include "bind.h"
+#include "levels.h"
 #include "module_types.h"
 
 #define MAX_LEDS 32u
 
-struct led {
-    hm2_bit_t *on;
-};
-
 struct leds {
-    unsigned count;
-    struct led led[MAX_LEDS];
+    unsigned gathered;              /* LEDs in whole groups of HM2_GATHER */
+    hm2_bit_t nothing;              /* stays 0 */
+    struct hm2_bit_in on[MAX_LEDS]; /* the last of them first; of LEDs that do not exist: the constant 0 */
+    uint32_t seen;                  /* which are lit, as handed to the plan last */
     struct hm2_section data;
 };
 
 static const struct hm2_point points[] = {
-    HM2_POINT(struct led, on, "CR##", HM2_BIT, HM2_PIN_IN, 0, "", "1 = lit"),
+    HM2_POINT(struct hm2_bit_in, bit, "CR##", HM2_BIT, HM2_PIN_IN, 0, "", "1 = lit"),
 };
 
 static const struct hm2_point_group groups[] = {
@@ -43,10 +42,16 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
     if (!ctx)
         return HM2_ERR_NOMEM;
     module->context = ctx;
-    ctx->count = led_count(setup);
+    const unsigned count = led_count(setup);
+    ctx->gathered = (count + HM2_GATHER - 1u) / HM2_GATHER * HM2_GATHER;
     int err = 0;
-    for (unsigned i = 0; err == 0 && i < ctx->count; i++)
-        err = hm2_bind_group(setup, &groups[0], &ctx->led[i], i + 1);
+    for (unsigned i = 0; err == 0 && i < ctx->gathered; i++) {
+        struct hm2_bit_in *const led = &ctx->on[ctx->gathered - 1u - i];
+        if (i < count)
+            err = hm2_bind_group(setup, &groups[0], led, i + 1);
+        else
+            led->bit = &ctx->nothing;
+    }
     if (err == 0)
         err = hm2_plan_add_setup(setup->plan, &ctx->data, HM2_RANK_NORMAL, hm2_md_address(module->md, 0, 0), 1, 0,
                                  setup->diag);
@@ -56,10 +61,11 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct leds *const ctx = module->context;
-    uint32_t word = 0;
-    for (unsigned i = 0; i < ctx->count; i++)
-        word |= (uint32_t)*ctx->led[i].on << (31u - i);
-    hm2_section_set(&ctx->data, 0, word);
+    const uint32_t lit = hm2_gather(ctx->on, ctx->gathered);
+    if (lit != ctx->seen) {
+        ctx->seen = lit;
+        hm2_section_set(&ctx->data, 0, lit << (MAX_LEDS - ctx->gathered));
+    }
     if (cycle->writes == 0)
         hm2_section_touch(&ctx->data);
 }

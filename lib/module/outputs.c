@@ -26,12 +26,19 @@ int hm2_outputs_bind(struct hm2_outputs *const outputs, const struct hm2_module 
                      const struct hm2_setup *const setup, const struct hm2_point_group *const group,
                      const unsigned unit, const unsigned last)
 {
-    const uint32_t numbers = described(setup->idrom, module->md->gtag, unit);
+    const uint32_t numbers =
+        described(setup->idrom, module->md->gtag, unit) & (UINT32_MAX >> (HM2_OUTPUTS - 1u - last));
     int err = 0;
-    for (unsigned number = 0; err == 0 && number <= last && number < HM2_OUTPUTS; number++)
-        if (numbers >> number & 1u) {
-            outputs->bit[outputs->count] = (uint8_t)number;
-            err = hm2_bind_item(setup, group, &outputs->output[outputs->count++], unit, number);
-        }
+    if (numbers == 0)
+        return 0;
+    outputs->first = (unsigned)__builtin_ctz(numbers);
+    outputs->end = HM2_OUTPUTS - (unsigned)__builtin_clz(numbers);
+    for (unsigned number = outputs->first; err == 0 && number < outputs->end; number++) {
+        struct hm2_output *const output = &outputs->output[number];
+        if (numbers >> number & 1u)
+            err = hm2_bind_item(setup, group, output, unit, number);
+        else
+            output->out = output->invert = &outputs->nothing;
+    }
     return err;
 }

@@ -11,18 +11,18 @@ struct hm2_output {
     hm2_bit_t *out, *invert;
 };
 
-/* Outputs of one instance that have a pin descriptor, by rising number. */
+/* Outputs of one instance: those from number `first` to before `end`. */
 struct hm2_outputs {
-    unsigned count;
-    uint8_t bit[HM2_OUTPUTS];
-    struct hm2_output output[HM2_OUTPUTS];
+    unsigned first, end;
+    hm2_bit_t nothing;                     /* stays 0: pins of an output between that has no pin descriptor */
+    struct hm2_output output[HM2_OUTPUTS]; /* by number */
 };
 
 #define HM2_OUTPUT_ROWS 2u
 extern const struct hm2_point hm2_output_points[HM2_OUTPUT_ROWS];
 
-/* Find the outputs of an instance among the pin descriptors, up to output number last, and create their pins with the
- * group's prefix ("ssr.##"). */
+/* Find the outputs of an instance among the pin descriptors, up to output number last (0 to 31), and create their pins
+ * with the group's prefix ("ssr.##"). */
 int HM2_MUST_CHECK hm2_outputs_bind(struct hm2_outputs *outputs, const struct hm2_module *module,
                                     const struct hm2_setup *setup, const struct hm2_point_group *group, unsigned unit,
                                     unsigned last);
@@ -30,10 +30,11 @@ int HM2_MUST_CHECK hm2_outputs_bind(struct hm2_outputs *outputs, const struct hm
 /* Data word: out xor invert (hal-interface 2.12). */
 static inline uint32_t hm2_outputs_word(const struct hm2_outputs *const outputs)
 {
+    const struct hm2_output *const first = outputs->output + outputs->first;
     uint32_t word = 0;
-    for (unsigned i = 0; i < outputs->count; i++)
-        word |= (uint32_t)(*outputs->output[i].out != *outputs->output[i].invert) << outputs->bit[i];
-    return word;
+    for (const struct hm2_output *at = outputs->output + outputs->end; at > first; at--)
+        word = word << 1 | ((unsigned)*at[-1].out ^ *at[-1].invert);
+    return word << outputs->first;
 }
 
 #endif

@@ -20,10 +20,6 @@ enum { REG_CONTROL, REG_FILTER_SELECT, REG_FILTERED, REG_RAW, REG_COUNTERS };
 #define SLOW_MAX        1023u /* control, bits 31..22 */
 #define CLOCKS_PER_STEP 4u    /* an input takes (divisor + 1) * 4 clocks */
 
-struct slow {
-    hm2_bit_t *slow; /* of inputs that do not exist: a constant 0 */
-};
-
 struct counter {
     hm2_s32_t *count;
     hm2_bit_t *reset, *mode_4x;
@@ -34,11 +30,11 @@ struct instance {
     uint32_t width;                        /* scan_width, as the card says */
     uint32_t for_rate, for_fast, for_slow; /* parameters that the control word was computed from */
     uint32_t present;                      /* inputs that exist as pins */
-    unsigned end;                          /* behind the highest of them */
+    unsigned end;                          /* behind the highest of them, in whole groups of HM2_GATHER */
     uint32_t shown, shown_raw, counts;     /* levels as the pins have them, and counters as they were read last */
     unsigned turn, turns;
     struct hm2_level filtered[MAX_INPUTS], raw[MAX_INPUTS];
-    struct slow slow[MAX_INPUTS];
+    struct hm2_bit_in slow[MAX_INPUTS]; /* of inputs that do not exist: a constant 0 */
     struct counter counter[COUNTERS];
 };
 
@@ -74,7 +70,7 @@ const struct hm2_point hm2_scanned_raw_points[HM2_SCANNED_LEVEL_ROWS] = {
 };
 
 const struct hm2_point hm2_scanned_slow_points[HM2_SCANNED_SLOW_ROWS] = {
-    HM2_POINT(struct slow, slow, "input-##-slow", HM2_BIT, HM2_PIN_IN, 0, "",
+    HM2_POINT(struct hm2_bit_in, bit, "input-##-slow", HM2_BIT, HM2_PIN_IN, 0, "",
               "1 = filtered with slow_scans, 0 = with fast_scans"),
 };
 
@@ -109,7 +105,7 @@ static int bind_inputs(const struct hm2_setup *const setup, const struct hm2_poi
     for (unsigned i = 0; err == 0 && i < MAX_INPUTS; i++) {
         if (!(instance->present >> i & 1u))
             continue;
-        instance->end = i + 1;
+        instance->end = (i / HM2_GATHER + 1u) * HM2_GATHER;
         err = hm2_bind_item(setup, &groups[GROUP_FILTERED], &instance->filtered[i], unit, i);
         if (err == 0)
             err = hm2_bind_item(setup, &groups[GROUP_RAW], &instance->raw[i], unit, i);
@@ -141,9 +137,9 @@ static int setup_instance(const struct hm2_module *const module, struct hm2_setu
         err = bind_inputs(setup, module->type->groups, instance, unit);
     }
     for (unsigned i = 0; i < MAX_INPUTS; i++)
-        if (!instance->slow[i].slow)
-            instance->slow[i].slow = &ctx->nothing;
-    instance->turns = hm2_turns(instance->end);
+        if (!instance->slow[i].bit)
+            instance->slow[i].bit = &ctx->nothing;
+    instance->turns = 2u * hm2_turns(instance->end);
     return err;
 }
 
@@ -228,18 +224,21 @@ static bool is_reset(const struct instance *const instance)
 void hm2_scanned_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct scanned *const ctx = module->context;
-    (void)cycle;
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct instance *const instance = &ctx->instance[unit];
         const uint32_t filtered = hm2_window_get(&ctx->filtered, unit);
         const uint32_t raw = hm2_window_get(&ctx->raw, unit);
         const uint32_t counts = hm2_window_get(&ctx->counters, unit);
-        const uint32_t turn = HM2_TURN_MASK(instance->turn);
-        hm2_show_levels(instance->filtered, filtered, ((filtered ^ instance->shown) | turn) & instance->present);
-        hm2_show_levels(instance->raw, raw, ((raw ^ instance->shown_raw) | turn) & instance->present);
+        /* Filtered and raw inputs take turns; before the first write, when links may be new, it is everybody's. */
+        const uint32_t turn = cycle->writes == 0 ? UINT32_MAX : HM2_TURN_MASK(instance->turn / 2u);
+        const uint32_t filtered_turn = instance->turn % 2u == 0 || cycle->writes == 0 ? turn : 0;
+        const uint32_t raw_turn = instance->turn % 2u == 1 || cycle->writes == 0 ? turn : 0;
+        hm2_show_levels(instance->filtered, filtered,
+                        ((filtered ^ instance->shown) | filtered_turn) & instance->present);
+        hm2_show_levels(instance->raw, raw, ((raw ^ instance->shown_raw) | raw_turn) & instance->present);
         instance->shown = filtered;
         instance->shown_raw = raw;
-        if (counts != instance->counts || instance->turn == 0 || is_reset(instance))
+        if (counts != instance->counts || is_reset(instance))
             count(instance, counts);
         instance->turn = instance->turn + 1 < instance->turns ? instance->turn + 1 : 0;
     }
@@ -297,10 +296,7 @@ void hm2_scanned_pack(struct hm2_module *const module, const struct hm2_cycle *c
     struct scanned *const ctx = module->context;
     for (unsigned unit = 0; unit < module->instances; unit++) {
         const struct instance *const instance = &ctx->instance[unit];
-        uint32_t slow = 0;
-        for (unsigned input = instance->end; input > 0; input--)
-            slow = slow << 1 | *instance->slow[input - 1].slow;
-        hm2_window_set(&ctx->filter_select, unit, slow);
+        hm2_window_set(&ctx->filter_select, unit, hm2_gather(instance->slow, instance->end));
         /* Parameters are only set by people: looked at in one turn of a round. */
         if (instance->turn == 0 || cycle->writes == 0)
             pack_parameters(module, unit, cycle->writes == 0);

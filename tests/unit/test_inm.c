@@ -13,7 +13,7 @@
 #define INMUX_CONTROL 0x8000
 
 /* Cycles in which every input is shown and every parameter looked at, for any width. */
-#define ALL_TURNS 8u
+#define ALL_TURNS 32u
 
 static struct module_rig *started(const uint32_t control, struct hm2_module **inm)
 {
@@ -138,6 +138,32 @@ static void inputs_show_filtered_and_raw_levels_and_their_inverse(void **state)
             assert_true(rig_get(rig, name) == raw);
             (void)snprintf(name, sizeof name, "inm.00.raw-input-%02u-not", input);
             assert_true(rig_get(rig, name) == 1.0 - raw);
+        }
+    }
+    rig_free(rig);
+}
+
+/* A host may link a pin at any time, to a signal that has another level. */
+static void inputs_that_never_change_are_written_at_once_at_first_and_then_in_turns(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = started(10, NULL);
+    rig_put(rig, FILTERED(0), 0x7FF);
+    rig_put(rig, RAW(0), 0x7FF);
+    rig_cycles(rig, 2);
+    for (unsigned first = 0; first < 2; first++) {
+        rig->cycle.writes = first == 0 ? 0 : rig->cycle.writes;
+        for (unsigned input = 0; input < 22; input++) {
+            char name[64];
+            (void)snprintf(name, sizeof name, "inm.00.%sinput-%02u", input < 11 ? "" : "raw-", input % 11);
+            rig_set(rig, name, 0);
+        }
+        rig_cycles(rig, first == 0 ? 1 : 12);
+        for (unsigned input = 0; input < 22; input++) {
+            char name[64];
+            (void)snprintf(name, sizeof name, "inm.00.%sinput-%02u", input < 11 ? "" : "raw-", input % 11);
+            if (rig_get(rig, name) != 1.0)
+                fail_msg("round %u: %s was not written", first, name);
         }
     }
     rig_free(rig);
@@ -301,6 +327,7 @@ int main(void)
         cmocka_unit_test(parameters_are_brought_into_their_limits_and_rewritten),
         cmocka_unit_test(a_slow_rate_set_before_the_first_write_does_not_spill_into_the_filter),
         cmocka_unit_test(inputs_show_filtered_and_raw_levels_and_their_inverse),
+        cmocka_unit_test(inputs_that_never_change_are_written_at_once_at_first_and_then_in_turns),
         cmocka_unit_test(slow_inputs_are_selected_in_every_cycle),
         cmocka_unit_test(hand_wheels_count_from_zero_across_the_wrap_of_eight_bits),
         cmocka_unit_test(counts_survive_a_card_that_comes_back_with_its_counters_at_zero),

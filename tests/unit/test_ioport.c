@@ -12,8 +12,8 @@
 #define OPEN_DRAIN(port) (uint16_t)(0x1300 + 4 * (port))
 #define INVERT(port)     (uint16_t)(0x1400 + 4 * (port))
 
-/* Cycles in which every parameter is looked at and every level written once: 3 ports of 17 bits, 4 at a time. */
-#define ALL_TURNS 15u
+/* Cycles in which every parameter is looked at and every level written once: 3 ports of 17 bits, 2 at a time. */
+#define ALL_TURNS 27u
 
 /* A module that owns pins like a real one, with or without names. */
 static int claim_deferred(struct hm2_module *module, struct hm2_setup *setup)
@@ -117,6 +117,29 @@ static void a_pin_that_never_changes_is_still_written_now_and_then(void **state)
     rig_free(rig);
 }
 
+static void pins_linked_before_the_first_cycle_show_their_levels_at_once(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = rig_new(rig_image_7i96s(), "");
+    (void)rig_add(rig, &hm2_ioport_type);
+    for (unsigned port = 0; port < 3; port++)
+        rig_put(rig, DATA(port), 0x1FFFF);
+    rig_start(rig);
+    for (unsigned io = 0; io < 51; io++) {
+        char name[64];
+        (void)snprintf(name, sizeof name, "gpio.%03u.in", io);
+        assert_true(rig_get(rig, name) == 1.0);
+        rig_set(rig, name, 0);
+    }
+    rig_read(rig);
+    for (unsigned io = 0; io < 51; io++) {
+        char name[64];
+        (void)snprintf(name, sizeof name, "gpio.%03u.in", io);
+        assert_true(rig_get(rig, name) == 1.0);
+    }
+    rig_free(rig);
+}
+
 static void module_pins_have_their_source_from_load_on_and_gpio_never(void **state)
 {
     (void)state;
@@ -164,10 +187,14 @@ static void outputs_follow_their_pins_in_every_cycle(void **state)
 {
     (void)state;
     struct module_rig *const rig = started("");
-    rig_set(rig, "gpio.011.out", 1);
-    rig_set(rig, "gpio.016.out", 1);
-    rig_set(rig, "gpio.033.out", 1);
-    rig_set(rig, "gpio.050.out", 1);
+    static const char *const outputs[] = {"gpio.011", "gpio.016", "gpio.033", "gpio.050"};
+    for (size_t i = 0; i < sizeof outputs / sizeof outputs[0]; i++) {
+        char name[32];
+        (void)snprintf(name, sizeof name, "%s.is_output", outputs[i]);
+        rig_set(rig, name, 1);
+        (void)snprintf(name, sizeof name, "%s.out", outputs[i]);
+        rig_set(rig, name, 1);
+    }
     rig_cycle(rig);
     assert_int_equal(rig_written(rig, DATA(0)), 1u << 11 | 1u << 16);
     assert_int_equal(rig_written(rig, DATA(1)), 1u << 16);
@@ -175,6 +202,27 @@ static void outputs_follow_their_pins_in_every_cycle(void **state)
     rig_set(rig, "gpio.016.out", 0);
     rig_cycle(rig);
     assert_int_equal(rig_written(rig, DATA(0)), 1u << 11);
+    rig_free(rig);
+}
+
+static void a_pin_that_becomes_an_output_drives_its_value_from_the_same_write_on(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = started("");
+    rig_set(rig, "gpio.040.out", 1);
+    rig_cycles(rig, ALL_TURNS);
+    rig_set(rig, "gpio.040.is_output", 1);
+    unsigned cycles = 0;
+    for (; cycles < ALL_TURNS && !(rig_written(rig, DIRECTION(2)) & 1u << 6); cycles++)
+        rig_cycle(rig);
+    assert_true(cycles < ALL_TURNS);
+    assert_int_equal(rig_written(rig, DATA(2)), 1u << 6);
+    assert_true(rig_position(rig, DATA(2)) < rig_position(rig, DIRECTION(2)));
+    /* and follows its pin as long as the card may still drive it */
+    rig_set(rig, "gpio.040.is_output", 0);
+    rig_set(rig, "gpio.040.out", 0);
+    rig_cycle(rig);
+    assert_int_equal(rig_written(rig, DATA(2)), 0);
     rig_free(rig);
 }
 
@@ -402,10 +450,12 @@ int main(void)
         cmocka_unit_test(which_points_a_pin_has_follows_from_its_owner),
         cmocka_unit_test(levels_of_the_pads_show_in_the_same_cycle_with_their_inverse),
         cmocka_unit_test(a_pin_that_never_changes_is_still_written_now_and_then),
+        cmocka_unit_test(pins_linked_before_the_first_cycle_show_their_levels_at_once),
         cmocka_unit_test(module_pins_have_their_source_from_load_on_and_gpio_never),
         cmocka_unit_test(immediate_outputs_drive_from_load_on_and_deferred_ones_from_the_first_write_on),
         cmocka_unit_test(polarity_set_before_the_first_write_reaches_the_card_before_the_direction),
         cmocka_unit_test(outputs_follow_their_pins_in_every_cycle),
+        cmocka_unit_test(a_pin_that_becomes_an_output_drives_its_value_from_the_same_write_on),
         cmocka_unit_test(changed_parameters_are_sent_within_the_turns_and_only_then),
         cmocka_unit_test(an_input_never_has_open_drain_because_that_drives),
         cmocka_unit_test(a_bite_keeps_directions_off_until_it_is_acknowledged),
