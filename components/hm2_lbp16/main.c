@@ -9,6 +9,7 @@
  */
 #include <errno.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdatomic.h>
 #include <string.h>
 #include <time.h>
@@ -55,28 +56,51 @@ RTAPI_MP_INT(use_serial_numbers, "name smart-serial remotes by unit number");
 static int sserial_baudrate = -1;
 RTAPI_MP_INT(sserial_baudrate, "force the smart-serial baud rate; -1 = as the firmware has it");
 
+#define NO_THREAD (-1)
+
 struct card {
     struct hm2_board *board;
-    unsigned cycle; /* calls of .read so far */
-    int thread;     /* the realtime thread that called it last */
+    atomic_bool busy;  /* one of its functions runs */
+    atomic_int thread; /* the realtime thread that called .read last */
+    unsigned cycle;    /* calls of .read so far; only that thread looks at it */
 };
 
 static int component_id;
 static struct card cards[MAX_CARDS];
 static unsigned card_count;
 static struct hal_binder hal;
+static atomic_bool closing; /* no function may touch a board any more */
 
 /* ---- functions of a card ------------------------------------------------------------------------------------------
- * A HAL file may schedule only .read for several cards. The first .read of a cycle then sends the requests of all
+ */
+
+/* A host may unload the component while its functions are still in a thread (LinuxCNC's does): what is announced here
+ * is waited for in close_functions(). Both sides are sequentially consistent, so either the function sees that
+ * everything closes, or the other side sees it run. */
+static bool enter(struct card *const card)
+{
+    atomic_store(&card->busy, true);
+    if (!atomic_load(&closing))
+        return true;
+    atomic_store_explicit(&card->busy, false, memory_order_release);
+    return false;
+}
+
+static void leave(struct card *const card)
+{
+    atomic_store_explicit(&card->busy, false, memory_order_release);
+}
+
+/* A HAL file may schedule only .read for several cards. The first .read of a cycle then sends the requests of all
  * cards that the same thread reads, so that they travel in parallel; a card that has left the thread lags behind in
  * its count and is no longer served. */
-
-static void request_all(const struct card *const caller, const long period)
+static void request_all(const struct card *const caller, const int thread, const long period)
 {
     for (unsigned i = 0; i < card_count; i++) {
         struct card *const other = &cards[i];
-        const bool same_turn = other->thread == caller->thread && other->cycle == caller->cycle;
-        if ((other == caller || same_turn) && !hm2_board_request_outstanding(other->board))
+        const bool same_turn =
+            atomic_load_explicit(&other->thread, memory_order_relaxed) == thread && other->cycle == caller->cycle;
+        if (same_turn && !hm2_board_request_outstanding(other->board))
             hm2_board_request(other->board, period);
     }
 }
@@ -84,26 +108,49 @@ static void request_all(const struct card *const caller, const long period)
 static void card_read_request(void *const arg, const long period)
 {
     struct card *const card = arg;
+    if (!enter(card))
+        return;
     if (!hm2_board_request_outstanding(card->board))
         hm2_board_request(card->board, period);
+    leave(card);
 }
 
 static void card_read(void *const arg, const long period)
 {
     struct card *const card = arg;
+    if (!enter(card))
+        return;
     if (card_count > 1) {
-        card->thread = rtapi_task_self();
+        const int thread = rtapi_task_self();
+        atomic_store_explicit(&card->thread, thread, memory_order_relaxed);
         if (!hm2_board_request_outstanding(card->board))
-            request_all(card, period);
+            request_all(card, thread, period);
         card->cycle++;
     }
     hm2_board_read(card->board, period);
+    leave(card);
 }
 
 static void card_write(void *const arg, const long period)
 {
     struct card *const card = arg;
+    if (!enter(card))
+        return;
     hm2_board_write(card->board, period);
+    leave(card);
+}
+
+#define CLOSE_STEP_NS 1000000L
+#define CLOSE_STEPS   2000u /* a read waits for its reply, at most for packet-read-timeout */
+
+/* Afterwards no function touches a board. */
+static void close_functions(void)
+{
+    const struct timespec step = {.tv_nsec = CLOSE_STEP_NS};
+    atomic_store(&closing, true);
+    for (unsigned i = 0, steps = 0; i < card_count; i++)
+        while (atomic_load(&cards[i].busy) && steps++ < CLOSE_STEPS)
+            nanosleep(&step, NULL);
 }
 
 static const struct {
@@ -137,7 +184,8 @@ static int export_functions(struct card *const card)
 
 /* ---- messages: formatted and printed outside the realtime threads ------------------------------------------------ */
 
-#define MESSAGE_POLL_NS 100000000L
+#define MESSAGE_POLL_NS       100000000L
+#define MESSENGER_STACK_BYTES (256 << 10)
 
 static pthread_t messenger;
 static bool messenger_runs;
@@ -163,10 +211,31 @@ static void *messenger_main(void *const unused)
     return NULL;
 }
 
+/* A thread of normal priority, whatever the loader has, with a small stack (hosts lock their memory) and no signals. */
+static int create_messenger(void)
+{
+    const struct sched_param normal = {.sched_priority = 0};
+    pthread_attr_t attributes;
+    sigset_t all, before;
+    int result = pthread_attr_init(&attributes);
+    if (result != 0)
+        return result;
+    (void)pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+    (void)pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
+    (void)pthread_attr_setschedparam(&attributes, &normal);
+    (void)pthread_attr_setstacksize(&attributes, (size_t)MESSENGER_STACK_BYTES);
+    (void)sigfillset(&all);
+    (void)pthread_sigmask(SIG_SETMASK, &all, &before);
+    result = pthread_create(&messenger, &attributes, messenger_main, NULL);
+    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
+    (void)pthread_attr_destroy(&attributes);
+    return result;
+}
+
 static int start_messenger(void)
 {
     atomic_store(&messenger_ends, false);
-    const int result = pthread_create(&messenger, NULL, messenger_main, NULL);
+    const int result = create_messenger();
     if (result != 0) {
         rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: no thread for messages: %s\n", strerror(result));
         return -result;
@@ -186,14 +255,13 @@ static void stop_messenger(void)
 
 /* ---- load and unload --------------------------------------------------------------------------------------------- */
 
+/* Warnings too at the level that hosts print by default: whoever loads a card shall see them. */
 static void print_diag(const char *const address, const struct hm2_diag *const diag)
 {
     const char *line = diag->text;
     while (*line) {
         const size_t len = strcspn(line, "\n");
-        const bool warning = strncmp(line, "warning: ", 9) == 0;
-        rtapi_print_msg(warning ? RTAPI_MSG_WARN : RTAPI_MSG_ERR, "hm2_lbp16: card %s: %.*s\n", address, (int)len,
-                        line);
+        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: %.*s\n", address, (int)len, line);
         line += len + (line[len] == '\n');
     }
 }
@@ -246,8 +314,13 @@ static int load_card(const char *const address, const char *const configuration)
 
     hm2_diag_clear(&diag);
     card->board = hm2_board_new();
-    if (!card->board)
+    if (!card->board) {
+        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: not loaded: %s\n", address, hm2_strerror(HM2_ERR_NOMEM));
         return -ENOMEM;
+    }
+    atomic_store(&card->busy, false);
+    atomic_store(&card->thread, NO_THREAD);
+    card->cycle = 0;
     card_count++;
     const int err = bring_up(card, address, configuration, &diag);
     print_diag(address, &diag);
@@ -260,6 +333,42 @@ static int load_card(const char *const address, const char *const configuration)
     return export_functions(card);
 }
 
+/* Length of an address without the port that is meant anyway. */
+static size_t address_len(const char *const address)
+{
+    static const char usual[] = ":27181";
+    const size_t len = strlen(address), port_len = sizeof usual - 1;
+    return len > port_len && strcmp(address + len - port_len, usual) == 0 ? len - port_len : len;
+}
+
+static bool same_address(const char *const a, const char *const b)
+{
+    return address_len(a) == address_len(b) && strncmp(a, b, address_len(a)) == 0;
+}
+
+/* Mistakes that no card can tell: two boards at one card would fight over it, and a comma within a configuration cuts
+ * it (the loader knows no quotes), which leaves a configuration without a card. */
+static int check_lists(const unsigned given)
+{
+    for (unsigned i = 0; i < given; i++)
+        for (unsigned k = 0; k < i; k++)
+            if (same_address(board_ip[i], board_ip[k])) {
+                rtapi_print_msg(RTAPI_MSG_ERR,
+                                "hm2_lbp16: board_ip: cards %u and %u both have the address %s; give "
+                                "each card its own\n",
+                                k, i, board_ip[i]);
+                return -EINVAL;
+            }
+    for (unsigned i = given; i < MAX_CARDS; i++)
+        if (config[i] && config[i][0])
+            rtapi_print_msg(
+                RTAPI_MSG_ERR,
+                "hm2_lbp16: warning: config: \"%s\" is for card %u, but board_ip has %u; it is ignored (words of a "
+                "configuration are separated by blanks, configurations by commas)\n",
+                config[i], i, given);
+    return 0;
+}
+
 static int load_cards(void)
 {
     if (!board_ip[0] || !board_ip[0][0]) {
@@ -267,17 +376,19 @@ static int load_cards(void)
                         "hm2_lbp16: no card given; load with: loadrt hm2_lbp16 board_ip=192.168.1.121\n");
         return -EINVAL;
     }
-    for (unsigned i = 0; i < MAX_CARDS && board_ip[i] && board_ip[i][0]; i++) {
-        const int result = load_card(board_ip[i], config[i]);
-        if (result < 0)
-            return result;
-    }
-    return 0;
+    unsigned given = 0;
+    while (given < MAX_CARDS && board_ip[given] && board_ip[given][0])
+        given++;
+    int result = check_lists(given);
+    for (unsigned i = 0; result == 0 && i < given; i++)
+        result = load_card(board_ip[i], config[i]);
+    return result;
 }
 
 /* Outputs go to their safe state before the memory that HAL's functions use goes away. */
 static void unload_cards(void)
 {
+    close_functions();
     for (unsigned i = 0; i < card_count; i++)
         hm2_board_stop(cards[i].board);
     stop_messenger();
@@ -294,6 +405,7 @@ int rtapi_app_main(void)
     if (component_id < 0)
         return component_id;
     hal_binder_init(&hal, component_id);
+    atomic_store(&closing, false);
     int result = load_cards();
     if (result == 0)
         result = start_messenger();

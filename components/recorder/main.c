@@ -4,9 +4,12 @@
  *
  *     loadrt recorder pins=6 depth=20000 file=/tmp/run.csv
  *
- * The memory is taken at load; when it is full, recording stops and recorder.full turns 1.
+ * The memory is taken and the file is created at load, so that a run is not lost for want of either; when the memory
+ * is full, recording stops and recorder.full turns 1.
  */
 #include <errno.h>
+#include <stdatomic.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,7 +58,10 @@ static const struct hm2_point channel_points[] = {
 
 static struct recorder *recorder;
 static double *rows; /* depth rows of time in seconds and one value a pin */
+/* Not read back from its pin: a pin that is linked takes the value of its signal. */
+static atomic_uint recorded;
 static double time_s;
+static FILE *out;
 static int component_id;
 
 static void sample(void *const unused, const long period)
@@ -63,43 +69,43 @@ static void sample(void *const unused, const long period)
     (void)unused;
     if (!*recorder->enable)
         return;
-    const uint32_t n = *recorder->samples;
-    if (n >= (uint32_t)depth) {
-        *recorder->full = 1;
+    const unsigned n = atomic_load_explicit(&recorded, memory_order_relaxed);
+    *recorder->samples = n;
+    *recorder->full = n >= (unsigned)depth;
+    if (n >= (unsigned)depth)
         return;
-    }
     double *const row = rows + (size_t)n * (size_t)(pins + 1);
     row[0] = time_s;
     for (int i = 0; i < pins; i++)
         row[i + 1] = *recorder->channels[i].value;
     time_s += (double)period * 1e-9;
     *recorder->samples = n + 1;
+    atomic_store_explicit(&recorded, n + 1, memory_order_release);
 }
 
-static int write_rows(FILE *const out)
+static void write_rows(void)
 {
+    const unsigned count = atomic_load_explicit(&recorded, memory_order_acquire);
     fputs("time_s", out);
     for (int i = 0; i < pins; i++)
         fprintf(out, ",pin%d", i);
     fputc('\n', out);
-    for (uint32_t n = 0; n < *recorder->samples; n++) {
+    for (unsigned n = 0; n < count; n++) {
         const double *const row = rows + (size_t)n * (size_t)(pins + 1);
         fprintf(out, "%.6f", row[0]);
         for (int i = 0; i < pins; i++)
             fprintf(out, ",%.9g", row[i + 1]);
         fputc('\n', out);
     }
-    return ferror(out) ? -EIO : 0;
 }
 
 static void save(void)
 {
-    FILE *const out = fopen(file, "w");
-    int result = out ? write_rows(out) : -errno;
-    if (out && fclose(out) != 0)
-        result = -errno;
-    if (result < 0)
-        rtapi_print_msg(RTAPI_MSG_ERR, "recorder: cannot write %s: %s\n", file, strerror(-result));
+    errno = 0;
+    write_rows();
+    const bool failed = ferror(out) != 0;
+    if (fclose(out) != 0 || failed)
+        rtapi_print_msg(RTAPI_MSG_ERR, "recorder: file %s: cannot be written: %s\n", file, strerror(errno));
 }
 
 static int check_parameters(void)
@@ -119,6 +125,33 @@ static int check_parameters(void)
     return 0;
 }
 
+static int open_file(void)
+{
+    out = fopen(file, "we");
+    if (out)
+        return 0;
+    const int error = errno;
+    rtapi_print_msg(RTAPI_MSG_ERR, "recorder: file %s: cannot be created: %s\n", file, strerror(error));
+    return -error;
+}
+
+#define PAGE_DOUBLES 512u /* not more than a page holds anywhere */
+
+/* Every page is written now, so that no cycle has to wait for one; volatile, or the compiler trusts calloc(). */
+static int take_memory(void)
+{
+    const size_t row_bytes = (size_t)(pins + 1) * sizeof *rows;
+    rows = calloc((size_t)depth, row_bytes);
+    if (!rows) {
+        rtapi_print_msg(RTAPI_MSG_ERR, "recorder: no memory for depth=%d cycles of %zu bytes\n", depth, row_bytes);
+        return -ENOMEM;
+    }
+    volatile double *const touched = rows;
+    for (size_t i = 0; i < (size_t)depth * (size_t)(pins + 1); i += PAGE_DOUBLES)
+        touched[i] = 0.0;
+    return 0;
+}
+
 static int create(void)
 {
     struct hal_binder hal;
@@ -126,11 +159,10 @@ static int create(void)
 
     hal_binder_init(&hal, component_id);
     recorder = hal.binder.alloc(&hal.binder, sizeof *recorder);
-    rows = calloc((size_t)depth, (size_t)(pins + 1) * sizeof *rows);
-    if (!recorder || !rows)
+    if (!recorder) {
+        rtapi_print_msg(RTAPI_MSG_ERR, "recorder: HAL has no memory left\n");
         return -ENOMEM;
-    /* Touched now, so that no cycle meets a page fault. */
-    memset(rows, 0, (size_t)depth * (size_t)(pins + 1) * sizeof *rows);
+    }
     int err = hm2_bind_points(&hal.binder, points, sizeof points / sizeof points[0], recorder, "recorder", 0, &diag);
     for (int i = 0; err == HM2_OK && i < pins; i++)
         err = hm2_bind_points(&hal.binder, channel_points, 1, &recorder->channels[i], "recorder", (unsigned)i, &diag);
@@ -149,11 +181,19 @@ int rtapi_app_main(void)
     component_id = hal_init("recorder");
     if (component_id < 0)
         return component_id;
-    result = create();
+    atomic_store(&recorded, 0);
+    time_s = 0.0;
+    result = take_memory();
+    if (result == 0)
+        result = create();
+    if (result == 0)
+        result = open_file();
     if (result == 0)
         result = hal_ready(component_id);
     if (result < 0) {
         hal_exit(component_id);
+        if (out)
+            (void)fclose(out);
         free(rows);
     }
     return result;
@@ -161,7 +201,7 @@ int rtapi_app_main(void)
 
 void rtapi_app_exit(void)
 {
+    hal_exit(component_id); /* first, so that no thread records any more */
     save();
-    hal_exit(component_id);
     free(rows);
 }

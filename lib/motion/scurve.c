@@ -50,7 +50,11 @@ int hm2_scurve_plan(struct hm2_scurve *const move, const double distance, const 
         set_phases(move, short_move_velocity(length, max_acceleration, max_jerk), max_acceleration, max_jerk);
     move->cruise_s = fmax(0.0, length / move->velocity - move->accel_s);
     move->total_s = 2.0 * move->accel_s + move->cruise_s;
-    return HM2_OK;
+    /* Limits at the ends of what a double holds overflow or vanish on the way here. */
+    if (isfinite(move->total_s) && isfinite(move->acceleration) && usable(move->velocity))
+        return HM2_OK;
+    memset(move, 0, sizeof *move);
+    return HM2_ERR_RANGE;
 }
 
 /* The acceleration phase alone, 0 <= t <= accel_s. */

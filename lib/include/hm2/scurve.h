@@ -17,7 +17,8 @@ struct hm2_scurve {
     double total_s;
 };
 
-/* Plan a move. Limits must be finite and above 0, distance finite; otherwise HM2_ERR_RANGE and a move of length 0. */
+/* Plan a move. Limits must be finite and above 0, distance finite; otherwise HM2_ERR_RANGE and a move of length 0. The
+ * same for limits so far apart that their quotients or the time of the move cannot be expressed. */
 HM2_API int HM2_MUST_CHECK hm2_scurve_plan(struct hm2_scurve *move, double distance, double max_velocity,
                                            double max_acceleration, double max_jerk);
 /* Distance covered and velocity t_s after the start; before it the start, after total_s exactly the distance. */
