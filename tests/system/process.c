@@ -27,27 +27,28 @@ static int64_t now_ms(void)
     return (int64_t)now.tv_sec * MS_PER_S + now.tv_nsec / NS_PER_MS;
 }
 
-static void become(const char *const *const argv, const int output, const pid_t parent)
+static void become(const char *const *const argv, const int input, const int output, const pid_t parent)
 {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent)
         _exit(EXEC_FAILED); /* the test is gone already */
     dup2(output, STDOUT_FILENO);
     dup2(output, STDERR_FILENO);
-    const int nothing = open("/dev/null", O_RDONLY);
-    if (nothing >= 0)
-        dup2(nothing, STDIN_FILENO);
+    const int from = input >= 0 ? input : open("/dev/null", O_RDONLY);
+    if (from >= 0)
+        dup2(from, STDIN_FILENO);
     execvp(argv[0], (char *const *)(uintptr_t)argv); /* execvp does not write through it (POSIX) */
     dprintf(STDERR_FILENO, "%s: %s\n", argv[0], strerror(errno));
     _exit(EXEC_FAILED);
 }
 
-void process_start(struct process *const process, const char *const *const argv)
+static void start(struct process *const process, const char *const *const argv, const bool listening)
 {
-    int ends[2];
+    int ends[2], input[2] = {-1, -1};
     const pid_t parent = getpid();
-    if (pipe2(ends, O_CLOEXEC))
+    if (pipe2(ends, O_CLOEXEC) || (listening && pipe2(input, O_CLOEXEC)))
         ck_abort_msg("no pipe: %s", strerror(errno));
+    process->input = input[1];
     process->output = ends[0];
     process->len = 0;
     process->text[0] = '\0';
@@ -56,8 +57,40 @@ void process_start(struct process *const process, const char *const *const argv)
     if (process->pid < 0)
         ck_abort_msg("cannot start %s: %s", argv[0], strerror(errno));
     if (process->pid == 0)
-        become(argv, ends[1], parent);
+        become(argv, input[0], ends[1], parent);
     close(ends[1]);
+    if (listening)
+        close(input[0]);
+}
+
+void process_start(struct process *const process, const char *const *const argv)
+{
+    start(process, argv, false);
+}
+
+void process_start_listening(struct process *const process, const char *const *const argv)
+{
+    signal(SIGPIPE, SIG_IGN); /* one that has ended is noticed when its answer is waited for */
+    start(process, argv, true);
+}
+
+void process_say(const struct process *const process, const char *const text)
+{
+    size_t done = 0;
+    const size_t len = strlen(text);
+    while (done < len) {
+        const ssize_t written = write(process->input, text + done, len - done);
+        if (written < 0)
+            return;
+        done += (size_t)written;
+    }
+}
+
+void process_hush(struct process *const process)
+{
+    if (process->input >= 0)
+        close(process->input);
+    process->input = -1;
 }
 
 static void reap(struct process *const process, const int options)
@@ -147,6 +180,7 @@ int process_stop(struct process *const process, const int signal, const int limi
         if (!process_wait_end(process, KILLED_LIMIT_MS))
             ck_abort_msg("process %d cannot be killed", (int)process->pid);
     }
+    process_hush(process);
     if (process->output >= 0)
         close(process->output);
     process->output = -1;

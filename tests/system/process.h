@@ -17,6 +17,7 @@
 
 struct process {
     pid_t pid;
+    int input;                       /* write end of stdin, -1 = it reads /dev/null */
     int output;                      /* read end of stdout and stderr together, -1 = closed */
     size_t len;                      /* of text, which is NUL terminated */
     char text[PROCESS_OUTPUT_BYTES]; /* all that it printed so far; more than fits is read and dropped */
@@ -27,6 +28,10 @@ struct process {
 
 /* Start argv[0] (a path, or a name that is looked for in PATH). The process is large: keep it static. */
 void process_start(struct process *process, const char *const *argv);
+/* The same with a standard input that process_say() writes to; process_hush() ends it. */
+void process_start_listening(struct process *process, const char *const *argv);
+void process_say(const struct process *process, const char *text);
+void process_hush(struct process *process);
 /* Wait until it has printed a line that begins with `start`; false when it ended or limit_ms passed before. *line
  * (may be NULL) points at it, within text. */
 bool process_wait_line(struct process *process, const char *start, int limit_ms, const char **line);
