@@ -81,7 +81,8 @@ SYSTEM_BIN := $(addprefix $(BUILDDIR)/system/,$(SYSTEM_TESTS))
 FUZZ_BIN := $(addprefix $(BUILDDIR)/fuzz/,$(FUZZERS))
 BENCH_BIN := $(addprefix $(BUILDDIR)/bench/,$(BENCHES))
 
-.PHONY: all help check check-unit check-system bench fuzz lint install uninstall dist clean format
+.PHONY: all help check check-unit check-system bench fuzz lint install uninstall linuxcnc install-linuxcnc \
+	uninstall-linuxcnc dist clean format
 .DEFAULT_GOAL := all
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -90,7 +91,7 @@ all: $(LIB_A) $(LIB_SO) $(SIM_A) $(PROGRAMS) $(COMPONENT_SO) $(BUILDDIR)/libhm2.
 
 help: ## this list
 	@echo 'make [TARGET] [BUILDDIR=build] [CC=gcc] [SANITIZE=-fsanitize=address,undefined] [V=1]'
-	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1\t\2/p' Makefile | expand -t 18
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1\t\2/p' Makefile | expand -t 22
 
 # ---- libraries ----------------------------------------------------------------------------------------------------
 
@@ -156,22 +157,32 @@ $(foreach c,$(COMPONENTS),$(eval $(call component_rule,$(c))))
 $(BUILDDIR)/test-components/%.so: $(BUILDDIR)/obj/tests/components/%.o $(call obj,$(COMPONENT_COMMON)) $(LIB_A)
 	$(component_link)
 
-# The same sources against LinuxCNC's own headers, where these are installed. Those are not clean for -Wpedantic and lack
-# prototypes.
-LINUXCNC_INCLUDE ?= /usr/include/linuxcnc
-LINUXCNC_SO := $(if $(wildcard $(LINUXCNC_INCLUDE)/hal.h),$(patsubst %,$(BUILDDIR)/linuxcnc/%.so,$(COMPONENTS)))
+# ---- LinuxCNC: the same sources against its own headers, into its own module folder --------------------------------
 
+# What its tools report (scripts/linuxcnc-dev), asked only by the rules that need it, once.
+halcompile = $(or $(HALCOMPILE),halcompile)
+linuxcnc_dev = $(or $(shell HALCOMPILE='$(halcompile)' $(SRCDIR)/scripts/linuxcnc-dev $(1)), \
+	$(error cannot build for LinuxCNC, for the reason above))
+LINUXCNC_FLAGS = $(eval LINUXCNC_FLAGS := $$(call linuxcnc_dev,flags))$(LINUXCNC_FLAGS)
+LINUXCNC_FOLDER = $(eval LINUXCNC_FOLDER := $$(or $$(LINUXCNC_MODULES),$$(call linuxcnc_dev,modules)))$(LINUXCNC_FOLDER)
+LINUXCNC_SO := $(patsubst %,$(BUILDDIR)/linuxcnc/%.so,$(COMPONENTS))
+
+# LinuxCNC's headers are not clean for -Wpedantic and lack prototypes, in macros that expand here.
 $(BUILDDIR)/obj/linuxcnc/%.o: %.c
 	@mkdir -p $(@D)
-	$(call say,CC,$< (LinuxCNC))$(CC) $(ALL_CPPFLAGS) -Icomponents -isystem $(LINUXCNC_INCLUDE) -DRTAPI -D__MODULE__ -DUSPACE \
+	$(call say,CC,$< (LinuxCNC))$(CC) $(ALL_CPPFLAGS) -Icomponents $(LINUXCNC_FLAGS) \
 		$(filter-out -Wpedantic -Wmissing-prototypes,$(ALL_CFLAGS)) $(DEPFLAGS) -c -o $@ $<
 $(BUILDDIR)/obj/linuxcnc/%.o: VISIBILITY := default
+# Its headers count, too: another LinuxCNC needs another build.
+$(BUILDDIR)/obj/linuxcnc/%.o: DEPFLAGS := -MD -MP
 
 define linuxcnc_rule
 $(BUILDDIR)/linuxcnc/$(1).so: $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc/%.o,$(wildcard components/$(1)/*.c) $(COMPONENT_COMMON)) $(LIB_A)
 	$$(component_link)
 endef
 $(foreach c,$(COMPONENTS),$(eval $(call linuxcnc_rule,$(c))))
+
+linuxcnc: $(LINUXCNC_SO) ## build the components for the LinuxCNC that is installed
 
 # The page lists the points from the tables that create them.
 $(BUILDDIR)/man/%: man/%.in $(BUILDDIR)/hm2points
@@ -199,7 +210,8 @@ $(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(HOST_A) $(LIB_A)
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) -Wl,--whole-archive $(HOST_A) \
 		-Wl,--no-whole-archive $(LIB_A) -rdynamic -lm -lpthread -ldl
 
-$(BUILDDIR)/system/check_linuxcnc: | $(LINUXCNC_SO)
+# Those skip what needs LinuxCNC where it is not installed.
+$(filter $(BUILDDIR)/system/check_linuxcnc%,$(SYSTEM_BIN)): | $(if $(shell command -v $(halcompile)),$(LINUXCNC_SO))
 # These load the test components.
 $(BUILDDIR)/unit/test_halhost $(BUILDDIR)/system/check_hm2host: | $(TEST_COMPONENT_SO)
 
@@ -256,6 +268,13 @@ uninstall: ## remove what install put there
 		$(DESTDIR)$(libdir)/pkgconfig/libhm2.pc
 	rm -rf $(DESTDIR)$(includedir)/hm2 $(DESTDIR)$(includedir)/hm2host $(DESTDIR)$(libdir)/hm2
 	for page in $(MAN_PAGES); do rm -f $(DESTDIR)$(mandir)/man$${page##*.}/$${page##*/}; done
+
+install-linuxcnc: linuxcnc ## install the components where LinuxCNC loads them from, below DESTDIR
+	$(INSTALL) -d $(DESTDIR)$(LINUXCNC_FOLDER)
+	$(INSTALL) -m 644 $(LINUXCNC_SO) $(DESTDIR)$(LINUXCNC_FOLDER)
+
+uninstall-linuxcnc: ## remove what install-linuxcnc put there
+	rm -f $(addprefix $(DESTDIR)$(LINUXCNC_FOLDER)/,$(notdir $(LINUXCNC_SO)))
 
 dist: ## source archive of the committed tree
 	@mkdir -p $(BUILDDIR)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "common/hal_binder.h"
 
+#include <errno.h>
 #include <limits.h>
 #include <string.h>
 
