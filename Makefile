@@ -211,7 +211,7 @@ $(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(HOST_A) $(LIB_A)
 		-Wl,--no-whole-archive $(LIB_A) -rdynamic -lm -lpthread -ldl
 
 # Those skip what needs LinuxCNC where it is not installed.
-$(filter $(BUILDDIR)/system/check_linuxcnc%,$(SYSTEM_BIN)): | $(if $(shell command -v $(halcompile)),$(LINUXCNC_SO))
+$(filter $(addprefix $(BUILDDIR)/system/check_,linuxcnc% dropin_names),$(SYSTEM_BIN)): | $(if $(shell command -v $(halcompile)),$(LINUXCNC_SO))
 # These load the test components.
 $(BUILDDIR)/unit/test_halhost $(BUILDDIR)/system/check_hm2host: | $(TEST_COMPONENT_SO)
 

@@ -87,11 +87,11 @@ static int check_serial(const struct hm2_board *const board, struct hm2_diag *co
     const unsigned there =
         instances_of(&board->idrom, HM2_GTAG_SSERIAL) + instances_of(&board->idrom, HM2_GTAG_SSERIALB);
     int err = 0;
+    /* LinuxCNC's driver passes over such a token in silence, so that there are load lines with it. */
     for (unsigned i = there; i < HM2_CFG_SSERIAL_PORTS; i++)
         if (config->sserial_port_used[i])
-            err = hm2_diag_add(diag, HM2_ERR_INVALID,
-                               "%s: config sserial_port_%u found, but the firmware has %u smart-serial ports",
-                               board->prefix, i, there);
+            hm2_diag_warn(diag, "%s: config sserial_port_%u has no effect: the firmware has %u smart-serial ports",
+                          board->prefix, i, there);
     static const struct {
         const char *key;
         uint8_t gtag;

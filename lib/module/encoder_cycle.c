@@ -137,6 +137,13 @@ static inline void show_positions(struct encoder *const enc)
     *enc->position_latched = (double)(raw_latched - zero) / scale;
 }
 
+static inline void show_inputs(struct encoder *const enc, const uint32_t control)
+{
+    *enc->input_a = control & ENCODER_A;
+    *enc->input_b = control >> 1 & 1u;
+    *enc->input_index = control >> 2 & 1u;
+}
+
 static inline void unpack_one(struct encoder *const enc, const struct encoder_module *const ctx, const uint32_t count,
                               const uint32_t control)
 {
@@ -154,9 +161,7 @@ static inline void unpack_one(struct encoder *const enc, const struct encoder_mo
     if (*enc->reset)
         enc->zero = enc->latched = enc->raw;
     show_positions(enc);
-    *enc->input_a = control & ENCODER_A;
-    *enc->input_b = control >> 1 & 1u;
-    *enc->input_index = control >> 2 & 1u;
+    show_inputs(enc, control);
     const bool error = enc->quad == ENCODER_QUAD_REPORT && (control & ENCODER_QUAD_ERROR);
     *enc->quad_error = error;
     if (error)
@@ -201,6 +206,7 @@ void encoder_start(struct hm2_module *const module, const struct hm2_cycle *cons
             enc->raw = enc->zero = enc->latched = enc->counter;
             show_positions(enc);
         }
+        show_inputs(enc, enc->seen);
         *enc->velocity = *enc->velocity_rpm = 0.0;
     }
     ctx->look = UINT_MAX;

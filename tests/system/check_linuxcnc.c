@@ -21,18 +21,6 @@
 #define MAX_SAMPLES   30000u
 #define CATCH_UP      1000u /* cycles; the first command is a jump of speed */
 
-#if defined __has_feature
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define SANITIZED 1
-#endif
-#endif
-#if defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__
-#define SANITIZED 1
-#endif
-#ifndef SANITIZED
-#define SANITIZED 0
-#endif
-
 /* What tests/system/hal/follow.hal commands: amplitude in units and frequency in Hz; both have 1000 steps a unit. */
 static const struct {
     double amplitude, hz;
@@ -266,7 +254,7 @@ END_TEST
 START_TEST(our_component_runs_in_linuxcnc_with_the_same_hal_file)
 {
     const struct peer *const peer = &ours[_i];
-    if (SANITIZED) {
+    if (TEST_SANITIZED) {
         printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
         return;
     }

@@ -13,6 +13,19 @@
 #include <sys/resource.h>
 #include <sys/types.h>
 
+/* Whether this build has a sanitizer that other programs cannot host in a module of ours. */
+#if defined __has_feature
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define TEST_SANITIZED 1
+#endif
+#endif
+#if defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__
+#define TEST_SANITIZED 1
+#endif
+#ifndef TEST_SANITIZED
+#define TEST_SANITIZED 0
+#endif
+
 #define PROCESS_OUTPUT_BYTES (256u * 1024u)
 
 struct process {

@@ -348,16 +348,22 @@ static void counts_beyond_the_firmware_are_refused_with_key_value_and_limit(void
 {
     struct fixture *const f = *state;
     assert_int_equal(setup_with(f, "num_encoders=3 num_resolvers=1 num_stepgens=5 num_leds=9 num_dplls=2 "
-                                   "sserial_port_1=0 ssi_chan_0=a%4u"),
+                                   "ssi_chan_0=a%4u"),
                      HM2_ERR_INVALID);
     said(f, "config num_encoders=3 found, at most 1 expected: the firmware has no more");
     said(f, "config num_resolvers=1 found, at most 0 expected");
-    said(f, "config sserial_port_1 found, but the firmware has 1 smart-serial ports");
     said(f, "config ssi_chan_0 found, but the firmware has 0 such channels");
     said(f, "warning: " PREFIX ": config num_dplls=2, but the firmware has 1; using 1");
     assert_null(strstr(f->diag.text, "num_stepgens"));
     assert_null(strstr(f->diag.text, "num_leds"));
     assert_int_equal(hm2_plain_count(f->plain), 0);
+}
+
+static void a_smart_serial_port_that_the_firmware_lacks_has_no_effect(void **state)
+{
+    struct fixture *const f = *state;
+    assert_int_equal(setup_with(f, "sserial_port_1=00000000"), 0);
+    said(f, "warning: " PREFIX ": config sserial_port_1 has no effect: the firmware has 1 smart-serial ports");
 }
 
 static void a_bad_config_word_is_refused(void **state)
@@ -1138,6 +1144,7 @@ int main(void)
         TEST(a_card_without_a_name_still_gets_one),
         TEST(modules_are_set_up_and_unknown_ones_left_alone),
         TEST(counts_beyond_the_firmware_are_refused_with_key_value_and_limit),
+        TEST(a_smart_serial_port_that_the_firmware_lacks_has_no_effect),
         TEST(a_bad_config_word_is_refused),
         TEST(descriptors_that_do_not_suit_their_driver_are_all_reported),
         TEST(pins_are_listed_with_terminal_and_owner),

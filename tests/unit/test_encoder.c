@@ -268,6 +268,20 @@ static void counting_starts_at_the_counters_value(void **state)
     rig_free(card.rig);
 }
 
+/* As in LinuxCNC, where HAL files and screens see the levels before any thread runs. */
+static void the_levels_of_the_inputs_show_from_load_on(void **state)
+{
+    (void)state;
+    struct encoder_card card = {.rig = rig_new(rig_image_7i96s(), ""), .base = 0x3000};
+    (void)rig_add(card.rig, &hm2_encoder_type);
+    rig_put(card.rig, CONTROL, 0x5);
+    rig_start(card.rig);
+    assert_int_equal(get(&card, "input-a"), 1);
+    assert_int_equal(get(&card, "input-b"), 0);
+    assert_int_equal(get(&card, "input-index"), 1);
+    rig_free(card.rig);
+}
+
 static void counts_survive_a_power_cycle(void **state)
 {
     (void)state;
@@ -705,6 +719,7 @@ int main(void)
         cmocka_unit_test(probing_for_the_timer_spares_the_counts_of_another_module),
         cmocka_unit_test(plain_and_muxed_encoders_together_are_refused_with_a_way_out),
         cmocka_unit_test(counting_starts_at_the_counters_value),
+        cmocka_unit_test(the_levels_of_the_inputs_show_from_load_on),
         cmocka_unit_test(counts_survive_a_power_cycle),
         cmocka_unit_test(positions_go_on_where_the_32_bit_pins_wrap),
         cmocka_unit_test(reset_holds_the_position_at_zero),

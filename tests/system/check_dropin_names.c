@@ -1,0 +1,277 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Name for name: LinuxCNC's driver (hostmot2 and hm2_eth) and our component are loaded into LinuxCNC, one after the
+ * other, with the same card and the same config= line. Every pin, parameter, function and alias of the former must
+ * exist in the latter, with the same type, direction and value; what is different is listed, with its reason, in
+ * tests/data/dropin/differences.
+ */
+#include <check.h>
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "dropin_table.h"
+#include "process.h"
+
+#define PEER_LIMIT_MS 60000
+#define CANNOT_RUN    77
+
+#define MAX_OBJECTS 2048u
+
+struct load {
+    const char *card, *name, *config;
+};
+
+static const struct load loads[] = {
+    {"7i96s", "default", ""},
+    {"7i96s", "no-sserial", "sserial_port_0=xxxxxxxx"},
+    {"7i96s", "raw", "enable_raw"},
+    {"7i96s", "fewer", "num_encoders=0 num_stepgens=2 num_pwmgens=0 enable_raw"},
+    {"7i96s", "no-io-modules", "num_leds=2 num_ssrs=0 num_inms=0 num_outms=0"},
+    {"7i96s", "nothing",
+     "num_encoders=0 num_stepgens=0 num_pwmgens=0 num_leds=0 num_ssrs=0 num_inms=0 num_outms=0 num_dplls=0"},
+    {"7i96s", "one-pin-stepgens", "stepgen_width=1 num_leds=3"},
+    {"7i96s", "too-many-clamped", "num_leds=9 num_dplls=5"},
+    {"7i93", "default", ""},
+    {"7i93", "typical", "num_encoders=3 num_pwmgens=3 num_stepgens=2 sserial_port_0=00000000"},
+    {"7i93", "no-dpll", "num_dplls=0 enable_raw"},
+    {"7i93", "encoders-only", "num_pwmgens=0 num_stepgens=0 num_leds=0"},
+    {"7i93", "wide-stepgens", "stepgen_width=6 firmware=ignored.bit"},
+};
+#define LOADS (sizeof loads / sizeof loads[0])
+
+enum { NO_KIND = 0, PIN = 'p', PARAMETER = 'r', FUNCTION = 'f', ALIAS = 'a' };
+
+struct object {
+    char kind, name[64], type[8], direction[8], value[64];
+};
+
+struct listing {
+    unsigned count;
+    struct object objects[MAX_OBJECTS];
+};
+
+/* What the forked tests count together. */
+struct shared {
+    unsigned compared;
+};
+
+static struct shared *shared;
+static struct process run;
+static char prefix[32]; /* "hm2_7i96s.0." */
+static struct listing theirs, ours;
+
+/* ---- loading ------------------------------------------------------------------------------------------------------
+ */
+
+static void write_file(const char *const folder, const char *const name, const char *const text)
+{
+    char path[320];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *const file = fopen(path, "w");
+    ck_assert_msg(file, "%s: %s", path, strerror(errno));
+    ck_assert_int_ge(fputs(text, file), 0);
+    ck_assert_int_eq(fclose(file), 0);
+}
+
+/* False when this machine cannot run it, which was said then. The output is in run.text. */
+static bool load(const struct load *const load, const char *const driver)
+{
+    char folder[256], hal[280], text[1024];
+    const char *skip;
+    snprintf(folder, sizeof folder, "%s/dropin-names-%s-%s-%s", TEST_BUILD, load->card, load->name, driver);
+    ck_assert(mkdir(folder, 0755) == 0 || errno == EEXIST);
+    snprintf(text, sizeof text,
+             "%sloadrt %s board_ip=192.168.1.121 config=\"%s\"\n"
+             "show pin %s\nshow param %s\nshow funct %s\nshow alias %s\n",
+             strcmp(driver, "hm2_eth") == 0 ? "loadrt hostmot2\n" : "", driver, load->config, prefix, prefix, prefix,
+             prefix);
+    write_file(folder, "load.hal", text);
+    snprintf(hal, sizeof hal, "%s/load.hal", folder);
+    ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
+    const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer", TEST_BUILD, folder, load->card, hal, NULL};
+    const int status = process_run(&run, argv, PEER_LIMIT_MS);
+    if (status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
+        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
+        return false;
+    }
+    if (status != 0) {
+        printf("%s\n", run.text);
+        fflush(stdout);
+        ck_abort_msg("%s with %s: exit status %d", driver, load->config, status);
+    }
+    return true;
+}
+
+/* ---- what halcmd shows --------------------------------------------------------------------------------------------
+ */
+
+/* One line of a listing, by its heading; false for what is no object. */
+static bool parse(const char kind, const char *const line, struct object *const o)
+{
+    char name[64];
+    bool parsed = false;
+    *o = (struct object){.kind = kind};
+    if (kind == FUNCTION)
+        parsed = sscanf(line, "%*s %*s %*s %7s %*s %63s", o->type, name) == 2; /* type: uses floating point */
+    else if (kind == ALIAS)
+        parsed = sscanf(line, "%63s %63s", name, o->value) == 2; /* value: the original name */
+    else if (kind != NO_KIND)
+        parsed = sscanf(line, "%*s %7s %7s %63s %63s", o->type, o->direction, o->value, name) == 4;
+    if (!parsed || strncmp(name, prefix, strlen(prefix)) != 0)
+        return false;
+    snprintf(o->name, sizeof o->name, "%s", name + strlen(prefix));
+    return true;
+}
+
+static void read_listing(struct listing *const listing)
+{
+    static const struct {
+        const char *text;
+        char kind;
+    } headings[] = {{"Component Pins:", PIN},
+                    {"Parameters:", PARAMETER},
+                    {"Exported Functions:", FUNCTION},
+                    {"Pin Aliases:", ALIAS},
+                    {"Parameter Aliases:", ALIAS}};
+    char kind = NO_KIND;
+    listing->count = 0;
+    for (char *line = strtok(run.text, "\n"); line; line = strtok(NULL, "\n")) {
+        struct object object;
+        for (size_t i = 0; i < sizeof headings / sizeof headings[0]; i++)
+            if (strcmp(line, headings[i].text) == 0)
+                kind = headings[i].kind;
+        if (!parse(kind, line, &object))
+            continue;
+        ck_assert_uint_lt(listing->count, MAX_OBJECTS);
+        listing->objects[listing->count++] = object;
+    }
+}
+
+static const struct object *find(const struct listing *const listing, const struct object *const like)
+{
+    for (unsigned i = 0; i < listing->count; i++)
+        if (listing->objects[i].kind == like->kind && strcmp(listing->objects[i].name, like->name) == 0)
+            return &listing->objects[i];
+    return NULL;
+}
+
+/* ---- comparing ----------------------------------------------------------------------------------------------------
+ */
+
+static char where[64];
+static unsigned problems;
+
+static void differs(const char *const what, const struct object *const object, const char *const their_value,
+                    const char *const our_value)
+{
+    if (dropin_table_allows(where, what, object->name))
+        return;
+    printf("%s: %s %c %s: %s in LinuxCNC's driver, %s in ours\n", where, what, object->kind, object->name, their_value,
+           our_value);
+    problems++;
+}
+
+static void compare_text(const char *const what, const struct object *const object, const char *const their_text,
+                         const char *const our_text)
+{
+    if (strcmp(their_text, our_text) != 0)
+        differs(what, object, their_text, our_text);
+}
+
+static void compare(void)
+{
+    for (unsigned i = 0; i < theirs.count; i++) {
+        const struct object *const a = &theirs.objects[i], *const b = find(&ours, a);
+        if (!b) {
+            differs(a->kind == ALIAS ? "alias-missing" : "missing", a, "there", "missing");
+            continue;
+        }
+        compare_text("type", a, a->type, b->type);
+        compare_text("direction", a, a->direction, b->direction);
+        compare_text("value", a, a->value, b->value);
+    }
+    for (unsigned i = 0; i < ours.count; i++) {
+        const struct object *const b = &ours.objects[i];
+        if (!find(&theirs, b))
+            differs(b->kind == ALIAS ? "alias-new" : "new", b, "missing", "there");
+    }
+}
+
+static unsigned count(const struct listing *const listing, const char kind)
+{
+    unsigned n = 0;
+    for (unsigned i = 0; i < listing->count; i++)
+        n += listing->objects[i].kind == kind;
+    return n;
+}
+
+static bool can_load_ours(void)
+{
+    if (TEST_SANITIZED)
+        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+    else if (access(TEST_BUILD "/linuxcnc/hm2_lbp16.so", R_OK) != 0)
+        printf("SKIP: LinuxCNC's headers are not installed (linuxcnc-uspace-dev)\n");
+    else
+        return true;
+    return false;
+}
+
+START_TEST(every_object_of_linuxcncs_driver_exists_in_ours_with_type_direction_and_default)
+{
+    const struct load *const l = &loads[_i];
+    snprintf(where, sizeof where, "names/%s/%s", l->card, l->name);
+    snprintf(prefix, sizeof prefix, "hm2_%s.0.", l->card);
+    if (!can_load_ours() || !load(l, "hm2_eth"))
+        return;
+    read_listing(&theirs);
+    if (!load(l, "hm2_lbp16"))
+        return;
+    read_listing(&ours);
+    compare();
+    printf("%s: %u pins, %u parameters, %u functions, %u aliases there; %u, %u, %u, %u here\n", where,
+           count(&theirs, PIN), count(&theirs, PARAMETER), count(&theirs, FUNCTION), count(&theirs, ALIAS),
+           count(&ours, PIN), count(&ours, PARAMETER), count(&ours, FUNCTION), count(&ours, ALIAS));
+    fflush(stdout);
+    /* At least inputs of all pins, the packet errors and the functions: an empty listing proves nothing. */
+    ck_assert_uint_gt(count(&theirs, PIN), 100);
+    ck_assert_uint_eq(count(&theirs, FUNCTION), 3);
+    ck_assert_uint_eq(problems, 0);
+    shared->compared++;
+}
+END_TEST
+
+START_TEST(no_row_of_the_table_is_stale)
+{
+    if (shared->compared < LOADS) {
+        printf("SKIP: only %u of %u loads were compared\n", shared->compared, (unsigned)LOADS);
+        return;
+    }
+    ck_assert_uint_eq(dropin_table_unused("names/"), 0);
+}
+END_TEST
+
+int main(void)
+{
+    dropin_table_load(TEST_DATA "/dropin/differences");
+    shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (shared == MAP_FAILED)
+        return 1;
+    Suite *const suite = suite_create("dropin names");
+    TCase *const tests = tcase_create("names");
+    tcase_set_timeout(tests, 2 * PEER_LIMIT_MS / 1000);
+    tcase_add_loop_test(tests, every_object_of_linuxcncs_driver_exists_in_ours_with_type_direction_and_default, 0,
+                        (int)LOADS);
+    tcase_add_test(tests, no_row_of_the_table_is_stale);
+    suite_add_tcase(suite, tests);
+    SRunner *const runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    const int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed > 0;
+}

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "dropin_table.h"
+
+#include <check.h>
+#include <errno.h>
+#include <fnmatch.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/mman.h>
+
+#define MAX_ROWS 256u
+
+struct row {
+    char where[64], what[16], name[64], limit[16];
+    unsigned line, used;
+};
+
+struct table {
+    unsigned count;
+    struct row rows[MAX_ROWS];
+};
+
+static struct table *table;
+
+static bool parse(const char *const line, struct row *const row)
+{
+    int reason = 0;
+    return sscanf(line, "%63s %15s %63s %15s %n", row->where, row->what, row->name, row->limit, &reason) == 4 &&
+           strlen(line + reason) > 10;
+}
+
+void dropin_table_load(const char *const path)
+{
+    char line[512];
+    table = mmap(NULL, sizeof *table, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (table == MAP_FAILED)
+        ck_abort_msg("no memory for the table: %s", strerror(errno));
+    FILE *const file = fopen(path, "r");
+    if (!file)
+        ck_abort_msg("%s: %s", path, strerror(errno));
+    for (unsigned number = 1; fgets(line, sizeof line, file); number++) {
+        if (line[0] == '#' || line[0] == '\n')
+            continue;
+        struct row *const row = &table->rows[table->count];
+        if (table->count == MAX_ROWS || !parse(line, row))
+            ck_abort_msg("%s:%u: not WHERE WHAT NAME LIMIT REASON, or too many rows: %s", path, number, line);
+        row->line = number;
+        table->count++;
+    }
+    fclose(file);
+}
+
+const char *dropin_table_allows(const char *const where, const char *const what, const char *const name)
+{
+    for (unsigned i = 0; i < table->count; i++) {
+        struct row *const row = &table->rows[i];
+        if (strcmp(row->what, what) != 0 || fnmatch(row->where, where, 0) != 0 || fnmatch(row->name, name, 0) != 0)
+            continue;
+        row->used++;
+        return row->limit;
+    }
+    return NULL;
+}
+
+unsigned dropin_table_unused(const char *const scope)
+{
+    unsigned unused = 0;
+    for (unsigned i = 0; i < table->count; i++) {
+        const struct row *const row = &table->rows[i];
+        if (row->used > 0 || strncmp(row->where, scope, strlen(scope)) != 0)
+            continue;
+        printf("line %u allows nothing any more: %s %s %s\n", row->line, row->where, row->what, row->name);
+        unused++;
+    }
+    return unused;
+}

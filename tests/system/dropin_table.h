@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * The reviewed table of differences between LinuxCNC's driver and ours: tests/data/dropin/differences. A difference
+ * that no row allows fails a test, and so does a row that allows nothing any more.
+ * Rows: WHERE WHAT NAME LIMIT REASON, see the table itself. Failures of the harness end the test through Check.
+ */
+#ifndef TEST_DROPIN_TABLE_H
+#define TEST_DROPIN_TABLE_H
+
+#include <stdbool.h>
+
+/* Read the table, into memory that forked tests share. Call it before the tests run. */
+void dropin_table_load(const char *path);
+
+/* Limit of the first row for a difference, which is then in use; NULL when no row allows it. `where` is what the row's
+ * first column is compared with ("names/7i96s/default"), `what` the kind, `name` the object without the card's
+ * prefix. */
+const char *dropin_table_allows(const char *where, const char *what, const char *name);
+
+/* Print every row whose first column begins with `scope` and that allowed nothing since the table was loaded; returns
+ * how many these are. */
+unsigned dropin_table_unused(const char *scope);
+
+#endif
