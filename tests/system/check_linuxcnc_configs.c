@@ -1,0 +1,215 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Whole configurations that others wrote, in LinuxCNC as Debian packages it, with our component and a simulated card:
+ * emergency stop off, machine on, home, run a program, be where the program says. Nothing of them is changed but what
+ * loads the driver, which program is the user interface, and one more HAL file.
+ */
+#include <check.h>
+#include <math.h>
+#include <signal.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "process.h"
+
+#define LIMIT_MS        100000
+#define CANNOT_RUN      77
+#define JOINTS          3u
+#define PARTS_OF_A_STEP 65536.0 /* position registers of step generators (register map 3.4) */
+
+struct config {
+    const char *name;              /* tests/system/linuxcnc/NAME.conf */
+    const char *prefix;            /* of the card's pins */
+    double end[JOINTS];            /* where the program ends */
+    double scale[JOINTS];          /* steps or counts a unit */
+    const char *feedback;          /* pin of a joint, with %u for the joint */
+    double accuracy;               /* of the axes' position, in units */
+    const char *registers[JOINTS]; /* registers that hold the position of step generators, or NULL */
+};
+
+static const struct config configs[] = {
+    {.name = "hm2-stepper",
+     .prefix = "hm2_7i93.0",
+     .end = {0.75, 0.3125, 0.5},
+     .scale = {1000, 1000, 1000},
+     .feedback = "stepgen.%02u.position-fb",
+     .accuracy = 0.001,
+     .registers = {"0x2100", "0x2104", "0x2108"}},
+};
+
+static struct process run;
+
+/* Check's own messages are short. */
+static void give_up(const char *const what)
+{
+    printf("%s\n", run.text);
+    fflush(stdout);
+    ck_abort_msg("%s, status %d", what, run.status);
+}
+
+/* False when this machine cannot run it, which was said then. */
+static bool run_config(const struct config *const config)
+{
+    char out[256];
+    const char *skip;
+    snprintf(out, sizeof out, "%s/config-%s", TEST_BUILD, config->name);
+    const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-config", TEST_BUILD, out, config->name, NULL};
+    process_start(&run, argv);
+    if (!process_wait_end(&run, LIMIT_MS)) {
+        process_stop(&run, SIGKILL, 0);
+        give_up("no end in time");
+    }
+    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
+        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
+        return false;
+    }
+    if (run.status != 0)
+        give_up("an exit status that is not 0");
+    return true;
+}
+
+/* What follows `start` on its line. */
+static const char *said(const char *const start)
+{
+    const char *line;
+    if (!process_wait_line(&run, start, 0, &line))
+        give_up(start);
+    return line + strlen(start);
+}
+
+static const char *pin(const struct config *const config, const char *const name)
+{
+    char start[128];
+    snprintf(start, sizeof start, "operator: %s.%s ", config->prefix, name);
+    return said(start);
+}
+
+/* ---- the configuration is the one that others wrote ---------------------------------------------------------------
+ */
+
+/* Beginnings of the lines that may differ, behind the name of their file. */
+static const char *const allowed[] = {
+    "< loadrt hostmot2", "< loadrt [HOSTMOT2](DRIVER) ", "< loadrt hm2_eth ",           "> loadrt hm2_lbp16 ",
+    "< DISPLAY =",       "> DISPLAY = operator ",        "> HALFILE = no-realtime.hal", "< BOARD=",
+    "> BOARD=",
+};
+
+static bool is_allowed(const char *const line)
+{
+    const char *const change = strstr(line, ": ");
+    for (size_t i = 0; change && i < sizeof allowed / sizeof allowed[0]; i++)
+        if (strncmp(change + 2, allowed[i], strlen(allowed[i])) == 0)
+            return true;
+    return false;
+}
+
+static void check_only_the_load_lines_differ(void)
+{
+    static const char start[] = "changed: ";
+    unsigned loads = 0;
+    for (const char *line = run.text; strncmp(line, start, strlen(start)) == 0; line = strchr(line, '\n') + 1) {
+        const char *const rest = line + strlen(start);
+        if (!is_allowed(rest))
+            ck_abort_msg("more than the load line was changed: %.*s", (int)strcspn(rest, "\n"), rest);
+        const char *const load = strstr(rest, "> loadrt hm2_lbp16 ");
+        loads += load && load < strchr(rest, '\n');
+    }
+    ck_assert_uint_eq(loads, 1);
+}
+
+/* ---- and it works -------------------------------------------------------------------------------------------------
+ */
+
+static void check_position(const struct config *const config, const char *const start, const double accuracy)
+{
+    double at[JOINTS];
+    if (sscanf(said(start), "%lf %lf %lf", &at[0], &at[1], &at[2]) != 3)
+        give_up(start);
+    for (unsigned i = 0; i < JOINTS; i++)
+        if (fabs(at[i] - config->end[i]) > accuracy)
+            ck_abort_msg("%sjoint %u: %.6f, not %.6f", start, i, at[i], config->end[i]);
+}
+
+static void check_feedback(const struct config *const config)
+{
+    char format[64], name[64];
+    for (unsigned i = 0; i < JOINTS; i++) {
+        snprintf(format, sizeof format, "%s", config->feedback);
+        char *const number = strstr(format, "%02u");
+        ck_assert_ptr_nonnull(number);
+        snprintf(name, sizeof name, "%.*s%02u%s", (int)(number - format), format, i, number + 4);
+        const double at = strtod(pin(config, name), NULL);
+        if (fabs(at - config->end[i]) > config->accuracy)
+            ck_abort_msg("%s is %.6f, not %.6f", name, at, config->end[i]);
+    }
+}
+
+/* What the card counted, seen by mesaflash. */
+static void check_steps(const struct config *const config)
+{
+    for (unsigned i = 0; i < JOINTS && config->registers[i]; i++) {
+        char start[64];
+        snprintf(start, sizeof start, "register %s ", config->registers[i]);
+        const double steps = (int32_t)(uint32_t)strtoul(said(start), NULL, 16) / PARTS_OF_A_STEP;
+        if (fabs(steps - config->end[i] * config->scale[i]) > 1)
+            ck_abort_msg("step generator %u made %.3f steps, not %.3f", i, steps, config->end[i] * config->scale[i]);
+    }
+}
+
+static void check_card_was_there(const struct config *const config)
+{
+    static const struct {
+        const char *name, *value;
+    } untouched[] = {
+        {"packet-error-total", "0"}, {"packet-lost", "0"},  {"packet-malformed", "0"},     {"write-lost", "0"},
+        {"packet-error", "FALSE"},   {"io_error", "FALSE"}, {"watchdog.has_bit", "FALSE"},
+    };
+    for (size_t i = 0; i < sizeof untouched / sizeof untouched[0]; i++) {
+        const char *const value = pin(config, untouched[i].name);
+        const size_t len = strcspn(value, "\n");
+        if (len != strlen(untouched[i].value) || strncmp(value, untouched[i].value, len) != 0)
+            ck_abort_msg("%s is %.*s", untouched[i].name, (int)len, value);
+    }
+}
+
+START_TEST(a_configuration_of_others_homes_and_ends_where_its_program_says)
+{
+    const struct config *const config = &configs[_i];
+    if (TEST_SANITIZED) {
+        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+        return;
+    }
+    if (access(TEST_BUILD "/linuxcnc/hm2_lbp16.so", R_OK) != 0) {
+        printf("SKIP: LinuxCNC's headers are not installed (linuxcnc-uspace-dev)\n");
+        return;
+    }
+    if (!run_config(config))
+        return;
+    check_only_the_load_lines_differ();
+    (void)said("operator: homed 3 joints");
+    check_position(config, "operator: commanded ", 1e-6);
+    check_position(config, "operator: actual ", config->accuracy);
+    check_feedback(config);
+    check_steps(config);
+    check_card_was_there(config);
+    (void)said("operator: done");
+}
+END_TEST
+
+int main(void)
+{
+    Suite *const suite = suite_create("linuxcnc configurations");
+    TCase *const tests = tcase_create("configurations");
+    tcase_set_timeout(tests, 120);
+    tcase_add_loop_test(tests, a_configuration_of_others_homes_and_ends_where_its_program_says, 0,
+                        (int)(sizeof configs / sizeof configs[0]));
+    suite_add_tcase(suite, tests);
+    SRunner *const runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    const int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed > 0;
+}
