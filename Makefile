@@ -122,7 +122,15 @@ $(LIB_SO): $(LIB_OBJ) lib/libhm2.map
 		-Wl,--version-script,lib/libhm2.map -Wl,-z,defs -o $@ $(LIB_OBJ) -lm -lpthread
 	@ln -sf $(@F) $(BUILDDIR)/libhm2.so
 
-$(BUILDDIR)/libhm2.pc: lib/libhm2.pc.in Makefile
+# What has a folder of the installation in it is made anew when the folder changes ("make", then "make install prefix=").
+PATHS := $(BUILDDIR)/paths
+$(PATHS): FORCE
+	@mkdir -p $(@D); echo '$(prefix) $(libdir) $(includedir)' | cmp -s - $@ || echo '$(prefix) $(libdir) $(includedir)' > $@
+.PHONY: FORCE
+FORCE:
+$(call obj,tools/hm2host/main.c): $(PATHS)
+
+$(BUILDDIR)/libhm2.pc: lib/libhm2.pc.in Makefile $(PATHS)
 	@mkdir -p $(@D)
 	$(call say,GEN,$@)sed -e 's|@prefix@|$(prefix)|' -e 's|@libdir@|$(libdir)|' -e 's|@includedir@|$(includedir)|' \
 		-e 's|@version@|$(VERSION)|' $< > $@
