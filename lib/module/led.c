@@ -64,7 +64,7 @@ static void pack(struct hm2_module *const module, const struct hm2_cycle *const 
     const uint32_t lit = hm2_gather(ctx->on, ctx->gathered);
     if (lit != ctx->seen) {
         ctx->seen = lit;
-        hm2_section_set(&ctx->data, 0, lit << (MAX_LEDS - ctx->gathered));
+        hm2_section_set(&ctx->data, 0, (uint32_t)((uint64_t)lit << (MAX_LEDS - ctx->gathered))); /* by 32: no LED */
     }
     if (cycle->writes == 0)
         hm2_section_touch(&ctx->data);

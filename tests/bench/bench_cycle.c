@@ -361,10 +361,10 @@ static int echo(char **const argv)
     const int cycles = (int)strtoul(argv[5], NULL, 10);
     const int fd = socket(AF_INET, SOCK_DGRAM, 0);
     static const char data[2048];
-    int64_t *const reads = calloc((size_t)cycles, sizeof *reads), *const writes =
-                                                                      calloc((size_t)cycles, sizeof *writes);
+    int64_t *const reads = calloc((size_t)cycles, sizeof *reads);
+    int64_t *const writes = calloc((size_t)cycles, sizeof *writes);
     if (!reads || !writes || fd < 0 || connect(fd, (const struct sockaddr *)&peer, sizeof peer) != 0)
-        return 1;
+        exit(1);
     take_processor(CLIENT_CPU);
     int64_t next = now_ns();
     for (int i = -WARM_UP; i < cycles; i++) {
@@ -372,13 +372,16 @@ static int echo(char **const argv)
         const int64_t read_ns = exchange(fd, data, request, reply);
         const int64_t start = now_ns();
         if (send(fd, data, write_bytes, 0) < 0)
-            return 1;
+            exit(1);
         if (i >= 0) {
             reads[i] = read_ns;
             writes[i] = now_ns() - start;
         }
     }
     print_cycle_times(reads, writes, cycles);
+    free(reads);
+    free(writes);
+    (void)close(fd);
     return 0;
 }
 

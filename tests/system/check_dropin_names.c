@@ -264,7 +264,7 @@ int main(void)
         return 1;
     Suite *const suite = suite_create("dropin names");
     TCase *const tests = tcase_create("names");
-    tcase_set_timeout(tests, 2 * PEER_LIMIT_MS / 1000);
+    tcase_set_timeout(tests, 2.0 * PEER_LIMIT_MS / 1000.0);
     tcase_add_loop_test(tests, every_object_of_linuxcncs_driver_exists_in_ours_with_type_direction_and_default, 0,
                         (int)LOADS);
     tcase_add_test(tests, no_row_of_the_table_is_stale);

@@ -250,8 +250,7 @@ START_TEST(threads_run_at_their_periods)
                                 "--run",
                                 "1",
                                 "-e",
-                                "loadrt threads name1=fast period1=250000 name2=slow "
-                                "period2=1000000",
+                                "loadrt threads name1=fast period1=250000 name2=slow period2=1000000",
                                 "-e",
                                 "loadrt hm2_points_test instances=2",
                                 "-e",
@@ -489,7 +488,7 @@ START_TEST(the_prompt_completes_and_remembers)
     at = wait_screen(at, "\n42\r\n");
     at = wait_screen(at, "hm2host: ");
     type("quit\n");
-    at = wait_screen(at, "points_test: exit");
+    wait_screen(at, "points_test: exit");
     int status;
     ck_assert_int_eq(waitpid(pid, &status, 0), pid);
     ck_assert(WIFEXITED(status) && WEXITSTATUS(status) == 0);

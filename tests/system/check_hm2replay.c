@@ -116,7 +116,7 @@ int main(void)
 {
     Suite *const suite = suite_create("hm2replay");
     TCase *const tests = tcase_create("hm2replay");
-    tcase_set_timeout(tests, 2 * END_MS / 1000);
+    tcase_set_timeout(tests, 2.0 * END_MS / 1000.0);
     tcase_add_checked_fixture(tests, make_folder, remove_folder);
     tcase_add_loop_test(tests, every_recorded_folder_passes, 0, 9);
     tcase_add_test(tests, a_difference_is_printed_and_makes_the_exit_status);

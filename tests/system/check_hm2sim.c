@@ -73,6 +73,7 @@ static size_t from_hex(const char *text, uint8_t bytes[const MAX_PAYLOAD])
     unsigned byte;
     int used;
     while (sscanf(text, " %2x%n", &byte, &used) == 1) {
+        ck_assert_uint_lt(len, MAX_PAYLOAD);
         bytes[len++] = (uint8_t)byte;
         text += used;
     }
@@ -91,7 +92,7 @@ static void send_hex(const int fd, const char *const to, const char *const hex)
 static ssize_t receive(const int fd, uint8_t bytes[const MAX_PAYLOAD], const int limit_ms, unsigned *const port)
 {
     struct pollfd p = {.fd = fd, .events = POLLIN};
-    struct sockaddr_in from;
+    struct sockaddr_in from = {0};
     socklen_t from_len = sizeof from;
     if (poll(&p, 1, limit_ms) <= 0)
         return -1;
@@ -104,7 +105,7 @@ static ssize_t receive(const int fd, uint8_t bytes[const MAX_PAYLOAD], const int
 /* Request and reply as hex; "" = no reply. */
 static void exchange_with(const char *const to, const char *const request, const char *const expected)
 {
-    uint8_t want[MAX_PAYLOAD], got[MAX_PAYLOAD];
+    uint8_t want[MAX_PAYLOAD], got[MAX_PAYLOAD] = {0};
     const int fd = open_client();
     const size_t want_len = from_hex(expected, want);
     send_hex(fd, to, request);
@@ -124,7 +125,7 @@ static void exchange(const char *const request, const char *const expected)
 static uint32_t read_register(const unsigned at)
 {
     char request[16];
-    uint8_t reply[MAX_PAYLOAD];
+    uint8_t reply[MAX_PAYLOAD] = {0};
     const int fd = open_client();
     snprintf(request, sizeof request, "0142%02X%02X", at & 0xFFu, at >> 8);
     send_hex(fd, address, request);
@@ -449,7 +450,7 @@ START_TEST(eight_cards_at_1_khz_take_at_most_half_a_core)
     const double cpu = (double)(sim.usage.ru_utime.tv_sec + sim.usage.ru_stime.tv_sec) +
                        (double)(sim.usage.ru_utime.tv_usec + sim.usage.ru_stime.tv_usec) / US_PER_S;
     const double per_cycle_us = cpu / CYCLES * US_PER_S;
-    printf("eight cards: %.0f us of processor time a cycle (%u cycles in %.2f s)\n", per_cycle_us, CYCLES, wall);
+    printf("eight cards: %.0f us of processor time a cycle (%d cycles in %.2f s)\n", per_cycle_us, CYCLES, wall);
     /* Judged by cycle, not by wall time: a loaded machine runs fewer cycles a second. */
     ck_assert_double_le(per_cycle_us, 500.0);
 }

@@ -218,8 +218,8 @@ static const char *shown(const char *const card, const char *const name)
 /* Both came to rest at zero, and the card counted what the driver counted. */
 static void check_rest(const char *const card)
 {
-    ck_assert_double_lt(fabs(atof(shown(card, "stepgen.00.position-fb"))), STEP);
-    ck_assert_double_lt(fabs(atof(shown(card, "stepgen.01.position-fb"))), STEP);
+    ck_assert_double_lt(fabs(strtod(shown(card, "stepgen.00.position-fb"), NULL)), STEP);
+    ck_assert_double_lt(fabs(strtod(shown(card, "stepgen.01.position-fb"), NULL)), STEP);
     ck_assert_str_eq(shown(card, "encoder.00.rawcounts"), shown(card, "stepgen.00.counts"));
     ck_assert_str_eq(shown(card, "packet-error-total"), "0x00000000");
     ck_assert_str_eq(shown(card, "packet-error"), "FALSE");

@@ -74,17 +74,26 @@ static int probe_main(void *const block)
     return probe_seen.not_ready ? 0 : hal_ready(probe_id);
 }
 
+char probe_order[16];
+
+static void note_exit(const char which)
+{
+    const size_t len = strlen(probe_order);
+    if (len + 1 < sizeof probe_order) {
+        probe_order[len] = which;
+        probe_order[len + 1] = '\0';
+    }
+}
+
 static void probe_exit(void *const block)
 {
     (void)block;
     probe_exits++;
-    strcat(probe_order, "p");
+    note_exit('p');
     hal_exit(probe_id);
 }
 
 /* A second component, to see in which order they go. */
-char probe_order[16];
-
 static int tail_id;
 
 static int tail_main(void *const block)
@@ -97,7 +106,7 @@ static int tail_main(void *const block)
 static void tail_exit(void *const block)
 {
     (void)block;
-    strcat(probe_order, "t");
+    note_exit('t');
     hal_exit(tail_id);
 }
 

@@ -277,6 +277,7 @@ static size_t serve(struct module_rig *const rig, const uint8_t *const data, con
             assert_int_equal(payload_len, bytes);
             do_write(rig, &command, payload);
         } else {
+            assert_non_null(out);
             assert_true(used + bytes <= capacity);
             do_read(rig, &command, out + used);
             used += bytes;

@@ -500,9 +500,9 @@ static void a_good_cycle_is_one_request_one_reply_one_write(void **state)
     assert_int_equal(f->card.writes - writes, 100);
     EXPECT("packet-error-total", 0);
     EXPECT("packet-lost", 0);
-    EXPECT("rtt-us", FAKE_REPLY_NS / 1000);
-    EXPECT("rtt-min-us", FAKE_REPLY_NS / 1000);
-    EXPECT("rtt-max-us", FAKE_REPLY_NS / 1000);
+    EXPECT("rtt-us", FAKE_REPLY_NS / 1000.0);
+    EXPECT("rtt-min-us", FAKE_REPLY_NS / 1000.0);
+    EXPECT("rtt-max-us", FAKE_REPLY_NS / 1000.0);
     assert_false(message(f, "", false));
 }
 
@@ -988,7 +988,7 @@ static void a_restore_ends_only_when_everything_is_confirmed_whatever_is_lost(vo
     struct fixture *const f = *state;
     start(f);
     set(f, "packet-error-limit", 1000);
-    for (unsigned pattern = 0; pattern < 256; pattern++) {
+    for (uint64_t pattern = 0; pattern < 256; pattern++) {
         const unsigned starts = f->probe->starts;
         cycles(f, 5);
         fake_card_power_cycle(&f->card);

@@ -72,7 +72,7 @@ static void terminals_of_the_7i96s_are_those_of_its_manual(void **state)
     assert_string_equal(type->terminals[34], "P1-1");
     assert_string_equal(type->terminals[50], "P1-13");
     for (unsigned i = 34; i < 51; i++)
-        assert_int_equal(atoi(type->terminals[i] + 3), hm2_connector_pin(17, i - 34));
+        assert_int_equal(strtol(type->terminals[i] + 3, NULL, 10), hm2_connector_pin(17, i - 34));
     assert_ptr_equal(find("7I96")->terminals, type->terminals);
 }
 

@@ -29,7 +29,7 @@ struct decoder {
 
 static void decode(struct decoder *const decoder, const struct trace_event *const event)
 {
-    static const int8_t place[2][2] = {{0, 3}, {1, 2}}; /* [a][b], in the order of counting up */
+    static const int place[2][2] = {{0, 3}, {1, 2}}; /* [a][b], in the order of counting up */
     const int before = place[decoder->a][decoder->b];
     if (trace_is(event, 'I', "A"))
         decoder->a = event->text[0] == '1';

@@ -369,8 +369,8 @@ static void completion_knows_what_stands_where(void **state)
         char name[64], found[256] = "";
         size_t at = 0;
         while (hal_session_complete(hal_rig_session(), rows[i].line, &at, name, sizeof name)) {
-            strcat(found, found[0] ? " " : "");
-            strcat(found, name);
+            const size_t used = strlen(found);
+            snprintf(found + used, sizeof found - used, "%s%s", used ? " " : "", name);
         }
         if (strcmp(found, rows[i].names) != 0)
             fail_msg("%s: found '%s', expected '%s'", rows[i].line, found, rows[i].names);

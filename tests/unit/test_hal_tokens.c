@@ -61,8 +61,8 @@ static void words_are_cut_as_halcmd_cuts_them(void **state)
         char joined[512] = "";
         assert_int_equal(hal_tokens_parse(&tokens, rows[i].line, &variables, &diag), 0);
         for (size_t w = 0; w < tokens.count; w++) {
-            strcat(joined, w ? "|" : "");
-            strcat(joined, tokens.items[w]);
+            const size_t used = strlen(joined);
+            snprintf(joined + used, sizeof joined - used, "%s%s", w ? "|" : "", tokens.items[w]);
         }
         assert_string_equal(joined, rows[i].words);
     }

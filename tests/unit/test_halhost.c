@@ -350,8 +350,8 @@ static void functions_are_added_at_their_position(void **state)
         const struct hh_schedule *const schedule = atomic_load(&thread->schedule);
         char order[128] = "";
         for (size_t f = 0; f < schedule->count; f++) {
-            strcat(order, f ? " " : "");
-            strcat(order, schedule->functs[f]->names.name);
+            const size_t used = strlen(order);
+            snprintf(order + used, sizeof order - used, "%s%s", f ? " " : "", schedule->functs[f]->names.name);
         }
         assert_string_equal(order, rows[i].order);
     }

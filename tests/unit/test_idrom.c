@@ -139,11 +139,11 @@ static void check_index_line(char *const line)
     const int result = hm2_idrom_parse(&image, NULL, &rom, &diag);
     check_violations(field[0], result, &diag);
     assert_memory_equal(rom.board_name + 4, field[2], strlen(field[2]) < 4 ? strlen(field[2]) : 4);
-    assert_int_equal(rom.io_ports, atoi(field[3]));
-    assert_int_equal(rom.io_width, atoi(field[4]));
+    assert_int_equal(rom.io_ports, strtol(field[3], NULL, 10));
+    assert_int_equal(rom.io_width, strtol(field[4], NULL, 10));
     assert_int_equal(rom.pin_count, rom.io_width);
-    assert_int_equal(rom.clock_low_hz, atoi(field[5]));
-    assert_int_equal(rom.clock_high_hz, atoi(field[6]));
+    assert_int_equal(rom.clock_low_hz, strtol(field[5], NULL, 10));
+    assert_int_equal(rom.clock_high_hz, strtol(field[6], NULL, 10));
     format_modules(&rom, modules, sizeof modules);
     assert_string_equal(modules, field[7]);
 }

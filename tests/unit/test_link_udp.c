@@ -222,7 +222,7 @@ static void two_links_of_one_host_do_not_hear_each_other(void **state)
     (void)state;
     struct peer cards[2];
     struct link *links[2];
-    struct sockaddr_in from[2];
+    struct sockaddr_in from[2] = {0};
     uint8_t data[8];
     for (unsigned i = 0; i < 2; i++) {
         peer_open(&cards[i]);

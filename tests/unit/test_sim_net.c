@@ -162,7 +162,7 @@ static void every_datagram_is_accounted_for(void **state)
     const struct seen seen = run_cycles(&rig, 20000);
     sim_net_sleep_until(rig.net, INT64_C(30000) * MS);
     unsigned rest = 0;
-    for (int got; (got = receive_number(&rig, 0)) != HM2_ERR_TIMEOUT;)
+    while (receive_number(&rig, 0) != HM2_ERR_TIMEOUT)
         rest++;
     const struct sim_net_truth t = sim_net_truth(rig.net);
     assert_int_equal(t.sent[0], 20000);

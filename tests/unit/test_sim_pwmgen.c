@@ -115,10 +115,10 @@ static void a_long_rest_is_skipped_as_many_short_ones(void **state)
         pwm_value_write(&channels[i], 0x03210000);
         pwm_mode_write(&channels[i], 0x07);
     }
-    const int64_t long_rest = 3ll << 40; /* a quarter of an hour at 200 MHz, and more than is skipped at once */
+    const int64_t long_rest = 3LL << 40; /* a quarter of an hour at 200 MHz, and more than is skipped at once */
     pwm_run(&refs[0], &channels[0], long_rest);
-    for (int64_t done = 0; done < long_rest; done += 1ll << 30)
-        pwm_run(&refs[1], &channels[1], 1ll << 30);
+    for (int64_t done = 0; done < long_rest; done += 1LL << 30)
+        pwm_run(&refs[1], &channels[1], 1LL << 30);
     assert_memory_equal(&channels[0], &channels[1], sizeof(channels[0]));
     assert_memory_equal(&refs[0], &refs[1], sizeof(refs[0]));
 }

@@ -68,7 +68,7 @@ static void a_header_with_too_many_columns_is_refused(void **state)
     (void)state;
     char text[200] = "c";
     for (unsigned i = 0; i < REPLAY_CSV_COLUMNS; i++)
-        strcat(text, ",c");
+        memcpy(text + 1 + 2 * (size_t)i, ",c", 3);
     struct replay_csv csv;
     struct hm2_diag diag;
     assert_int_equal(open_text(&csv, text, &diag), HM2_ERR_MALFORMED);
@@ -498,11 +498,11 @@ static void bench_note(struct bench *const b, const char kind, const char *const
     char number[4] = "";
     if (encoder < 2)
         snprintf(number, sizeof(number), "%u", encoder);
-    snprintf(b->events + used, sizeof(b->events) - used, "t,%lld,%c,%s%s,%08X", (long long)b->clk, kind, name, number,
-             (unsigned)value);
+    char mask_text[16] = "";
     if (mask)
-        snprintf(b->events + strlen(b->events), sizeof(b->events) - strlen(b->events), "/%08X", (unsigned)mask);
-    strcat(b->events, "\n");
+        snprintf(mask_text, sizeof(mask_text), "/%08X", (unsigned)mask);
+    snprintf(b->events + used, sizeof(b->events) - used, "t,%lld,%c,%s%s,%08X%s\n", (long long)b->clk, kind, name,
+             number, (unsigned)value, mask_text);
 }
 
 static void bench_write(struct bench *const b, const char *const name, const unsigned encoder, const uint16_t address,

@@ -115,7 +115,7 @@ static void the_default_times_are_the_longest_and_the_generators_get_their_clock
     struct bench bench = bench_open(rig_image_7i96s(), "");
     run(&bench);
     for (unsigned i = 0; i < GENERATORS; i++)
-        for (uint16_t reg = DIRSETUP; reg <= STEPSPACE; reg = (uint16_t)(reg + 0x100))
+        for (unsigned reg = DIRSETUP; reg <= STEPSPACE; reg += 0x100)
             assert_int_equal(rig_written(bench.rig, (uint16_t)(reg + 4 * i)), 0x3FFF);
     assert_int_equal(rig_written(bench.rig, MASTER_DDS), 0xFFFFFFFF);
     assert_int_equal(rig_written(bench.rig, TIMER), 0);
@@ -501,9 +501,10 @@ static double follow(struct bench *const bench, const struct hm2_scurve *const m
                      const double scale)
 {
     double worst = 0.0, before = from;
-    for (double t = 0.0; t < move->total_s + 0.05; t += 1e-3) {
+    const unsigned cycles = (unsigned)ceil((move->total_s + 0.05) * 1e3);
+    for (unsigned cycle = 0; cycle < cycles; cycle++) {
         double position, velocity;
-        hm2_scurve_at(move, t, &position, &velocity);
+        hm2_scurve_at(move, cycle * 1e-3, &position, &velocity);
         set(bench, "position-cmd", from + position);
         run(bench);
         worst = fmax(worst, fabs(get(bench, "position-fb") - before) * scale);
