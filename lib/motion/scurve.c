@@ -4,26 +4,33 @@
 #include <math.h>
 #include <string.h>
 
+/* Quotients and roots are taken apart here and below, because limits may be far from each other (a / j as infinity is
+ * as good as any large number). */
+static int reaches_acceleration(const double v, const double a, const double j)
+{
+    return v / a >= a / j;
+}
+
 /* Peak velocity of a move too short to reach max_velocity: the acceleration from rest takes v/a + a/j when a is
  * reached and 2*sqrt(v/j) when not, and a move without cruising covers v times that. */
 static double short_move_velocity(const double length, const double a, const double j)
 {
-    const double ramp = a * a / j;
-    const double v = 0.5 * (sqrt(ramp * ramp + 4.0 * a * length) - ramp);
-    if (v * j >= a * a)
+    const double ramp = a / j * a;
+    const double v = 0.5 * (hypot(ramp, 2.0 * sqrt(a) * sqrt(length)) - ramp);
+    if (reaches_acceleration(v, a, j))
         return v;
-    const double t = cbrt(length / (2.0 * j));
+    const double t = cbrt(length) / cbrt(2.0 * j);
     return j * t * t;
 }
 
 static void set_phases(struct hm2_scurve *const move, const double v, const double a, const double j)
 {
     move->velocity = v;
-    if (v * j >= a * a) {
+    if (reaches_acceleration(v, a, j)) {
         move->jerk_s = a / j;
         move->accel_s = v / a + a / j;
     } else {
-        move->jerk_s = sqrt(v / j);
+        move->jerk_s = sqrt(v) / sqrt(j);
         move->accel_s = 2.0 * move->jerk_s;
     }
     move->acceleration = j * move->jerk_s;
@@ -94,6 +101,7 @@ void hm2_scurve_at(const struct hm2_scurve *const move, const double t_s, double
     } else if (t_s > 0.0) {
         accelerate(move, t_s, &s, &v);
     }
-    *position = sign * s;
-    *velocity = sign * v;
+    /* Rounding must not carry the axis beyond its ends, however odd the limits. */
+    *position = sign * fmin(fmax(s, 0.0), fabs(move->distance));
+    *velocity = sign * fmin(fmax(v, 0.0), move->velocity);
 }

@@ -296,11 +296,50 @@ static void every_group_is_complete_and_names_are_legal(void **state)
     }
 }
 
+/* A name of the tables ("stepgen.##.position-scale") with digits for its marks. */
+static bool fits(const char *pattern, const char *name)
+{
+    for (; *pattern && *name; pattern++, name++)
+        if (*pattern == '#' ? *name < '0' || *name > '9' : *pattern != *name)
+            return false;
+    return *pattern == *name;
+}
+
+static bool is_in_groups(const struct hm2_point_group *group, const struct row *row, const char *name)
+{
+    for (; group->points; group++)
+        for (size_t i = 0; i < group->count; i++) {
+            const struct hm2_point *const point = &group->points[i];
+            char pattern[2 * HM2_NAME_SIZE];
+            (void)snprintf(pattern, sizeof pattern, "%s%s%s", group->prefix, group->prefix[0] ? "." : "", point->name);
+            if (fits(pattern, name) && point->type == row->type && point->dir == row->dir)
+                return true;
+        }
+    return false;
+}
+
+/* hm2points and the manual page print the tables: what exists must be in them, whatever made it. */
+static void every_object_of_the_list_is_in_the_printed_tables(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < ROWS; i++)
+        for (unsigned index = rows[i].first; index <= rows[i].last; index++) {
+            char name[HM2_NAME_SIZE];
+            bool found = false;
+            row_name(&rows[i], index, name);
+            for (size_t t = 0; hm2_module_types[t] && !found; t++)
+                found = is_in_groups(hm2_module_types[t]->groups, &rows[i], name);
+            if (!found)
+                fail_msg("%s is not in the tables, or with another type or direction", name);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_object_of_the_list_exists_as_it_is_listed),
         cmocka_unit_test(no_object_exists_that_is_not_listed),
+        cmocka_unit_test(every_object_of_the_list_is_in_the_printed_tables),
         cmocka_unit_test(the_counts_are_those_of_the_real_driver),
         cmocka_unit_test(variants_have_the_counts_of_the_real_driver),
         cmocka_unit_test(raw_access_adds_six_pins),

@@ -65,12 +65,40 @@ static void impossible_limits_are_refused(void **state)
     assert_true(move.total_s == 0.0);
 }
 
+/* Whatever the limits are, a move that is planned stays between its ends, at numbers. */
+static void extreme_limits_are_refused_or_harmless(void **state)
+{
+    (void)state;
+    static const double values[] = {5e-324, 1e-300, 1e-100, 1e-12, 1.0, 1e12, 1e100, 1e300, 1.7e308};
+    enum { VALUES = sizeof values / sizeof values[0] };
+    unsigned planned = 0;
+    for (unsigned i = 0; i < VALUES * VALUES * VALUES * VALUES; i++) {
+        const double length = values[i % VALUES], max_v = values[i / VALUES % VALUES],
+                     max_a = values[i / VALUES / VALUES % VALUES], max_j = values[i / VALUES / VALUES / VALUES];
+        struct hm2_scurve move;
+        if (hm2_scurve_plan(&move, length, max_v, max_a, max_j) != HM2_OK) {
+            assert_true(move.total_s == 0.0 && move.distance == 0.0);
+            continue;
+        }
+        planned++;
+        for (unsigned part = 0; part <= 16; part++) {
+            double s, v;
+            hm2_scurve_at(&move, move.total_s * part / 16.0, &s, &v);
+            if (!(s >= -1e-9 * length && s <= length * (1 + 1e-9) && v >= 0.0 && v <= max_v * (1 + 1e-9)))
+                fail_msg("distance %g, limits %g %g %g: %g, %g at %u/16 of %g s", length, max_v, max_a, max_j, s, v,
+                         part, move.total_s);
+        }
+    }
+    assert_true(planned > VALUES * VALUES);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_limit_holds_and_the_move_ends_at_its_distance),
         cmocka_unit_test(a_move_starts_at_rest_and_at_zero),
         cmocka_unit_test(impossible_limits_are_refused),
+        cmocka_unit_test(extreme_limits_are_refused_or_harmless),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
