@@ -284,6 +284,74 @@ START_TEST(every_word_of_the_configuration_in_the_page_is_accepted)
 }
 END_TEST
 
+/* ---- other components ------------------------------------------------------------------------------------------- */
+
+static const struct {
+    const char *name, *load, *prefix;
+} components[] = {
+    {"scurve", "loadrt scurve", "scurve.0."},
+    {"recorder", "loadrt recorder file=/dev/null", "recorder."},
+};
+#define COMPONENTS ((int)(sizeof components / sizeof components[0]))
+
+/* Rows of `show`: owner, type, direction, value, name. */
+static void take_shown(const char *const prefix, struct names *const points)
+{
+    char type[8], dir[8], name[NAME_SIZE], text[NAME_SIZE + 32];
+    points->count = 0;
+    for (const char *line = program.text; *line; line += strcspn(line, "\n"), line += *line == '\n') {
+        if (sscanf(line, "%*d %7s %7s %*s %95s", type, dir, name) != 3 || strncmp(name, prefix, strlen(prefix)) != 0 ||
+            strstr(name, ".time") || strstr(name, ".tmax"))
+            continue;
+        char *const number = strstr(name, "-00");
+        if (number)
+            memcpy(number, "-##", 3);
+        snprintf(text, sizeof text, "%s %s %s", name + strlen(prefix), type, dir);
+        add(points, text);
+    }
+}
+
+START_TEST(pages_of_other_components_list_their_points)
+{
+    static struct names shown, page;
+    char file_name[64], line[1024], name[NAME_SIZE], type[8], dir[8], text[NAME_SIZE + 32];
+    const char *const argv[] = {
+        process_built("hm2host"), "-e", components[_i].load, "-e", "show pin", "-e", "show param", NULL};
+    ck_assert_msg(process_run(&program, argv, END_MS) == 0, "%s", program.text);
+    take_shown(components[_i].prefix, &shown);
+    snprintf(file_name, sizeof file_name, "%s.9", components[_i].name);
+    FILE *const file = open_page(file_name);
+    page.count = 0;
+    while (fgets(line, sizeof line, file)) {
+        unescape(line);
+        if (sscanf(line, ".It Sy %95s Pq %7s %7s", name, type, dir) != 3)
+            continue;
+        snprintf(text, sizeof text, "%s %s %s", name, type, dir);
+        add(&page, text);
+    }
+    fclose(file);
+    expect_same(&shown, "the component", &page, file_name);
+}
+END_TEST
+
+START_TEST(every_component_has_a_page)
+{
+    unsigned found = 0;
+    DIR *const folder = opendir(TEST_SOURCE "/components");
+    ck_assert_ptr_nonnull(folder);
+    for (const struct dirent *entry; (entry = readdir(folder));) {
+        char page[300];
+        if (entry->d_name[0] == '.' || strcmp(entry->d_name, "common") == 0)
+            continue;
+        snprintf(page, sizeof page, "%s.9", entry->d_name);
+        ck_assert_msg(page_exists(page), "there is no page %s", page);
+        found++;
+    }
+    closedir(folder);
+    ck_assert_uint_ge(found, 3);
+}
+END_TEST
+
 /* ---- references ------------------------------------------------------------------------------------------------- */
 
 static void check_references(const char *const page)
@@ -292,7 +360,8 @@ static void check_references(const char *const page)
     int section;
     FILE *const file = open_page(page);
     while (fgets(line, sizeof line, file)) {
-        if (sscanf(line, ".Xr %63s %d", name, &section) != 2 || strncmp(name, "hm2", 3) != 0)
+        if (sscanf(line, ".Xr %63s %d", name, &section) != 2 ||
+            (strncmp(name, "hm2", 3) != 0 && strcmp(name, "scurve") != 0 && strcmp(name, "recorder") != 0))
             continue;
         snprintf(file_name, sizeof file_name, "%s.%d", name, section);
         ck_assert_msg(page_exists(file_name), "%s refers to %s, which does not exist", page, file_name);
@@ -330,6 +399,8 @@ int main(void)
     tcase_add_test(tests, every_point_is_in_the_page_of_the_component);
     tcase_add_test(tests, every_module_parameter_is_in_the_page_of_the_component);
     tcase_add_test(tests, every_word_of_the_configuration_in_the_page_is_accepted);
+    tcase_add_loop_test(tests, pages_of_other_components_list_their_points, 0, COMPONENTS);
+    tcase_add_test(tests, every_component_has_a_page);
     tcase_add_test(tests, references_among_our_pages_lead_somewhere);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);
