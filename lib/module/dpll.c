@@ -175,7 +175,7 @@ static uint32_t timer_value(const struct hm2_module *const module, const unsigne
     return (uint32_t)hm2_trunc_s32(-offset_us * per_us) & 0xFFFFu;
 }
 
-static void set_registers(const struct hm2_module *const module, const struct hm2_cycle *const cycle)
+HM2_RARE static void set_registers(const struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct dpll *const ctx = module->context;
     const double per_us = 65536e3 / (double)cycle->period_ns;
@@ -189,6 +189,12 @@ static void set_registers(const struct hm2_module *const module, const struct hm
         value[i] = timer_value(module, i, per_us);
     hm2_section_set(&ctx->timers12, 0, value[1] << 16 | value[0]);
     hm2_section_set(&ctx->timers34, 0, value[3] << 16 | value[2]);
+}
+
+HM2_RARE static void hold_at_zero(struct dpll *const ctx)
+{
+    hm2_section_touch(&ctx->phase);
+    hm2_section_touch(&ctx->control0); /* writing it clears the filtered phase error (tests/data/hm2dpll) */
 }
 
 static bool is_unchanged(const struct dpll *const ctx, const struct hm2_cycle *const cycle)
@@ -210,10 +216,8 @@ static void pack(struct hm2_module *const module, const struct hm2_cycle *const 
         return;
     if (!is_unchanged(ctx, cycle))
         set_registers(module, cycle);
-    if (cycle->writes < START_UP_WRITES) {
-        hm2_section_touch(&ctx->phase);
-        hm2_section_touch(&ctx->control0); /* writing it clears the filtered phase error (tests/data/hm2dpll) */
-    }
+    if (cycle->writes < START_UP_WRITES)
+        hold_at_zero(ctx);
 }
 
 static const struct hm2_md_variant variants[] = {{.version = 0, .registers = 7, .instance_stride = 4, .multiple = 0}};

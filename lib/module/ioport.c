@@ -18,7 +18,7 @@
 
 enum { REG_DATA, REG_DIRECTION, REG_ALT_SOURCE, REG_OPEN_DRAIN, REG_INVERT };
 
-#define LOOKS_PER_CYCLE 4u /* I/Os whose parameters are looked at in a cycle */
+#define LOOKS_PER_CYCLE 2u /* I/Os whose parameters are looked at in a cycle */
 
 struct gpio_out {
     hm2_bit_t *out;
@@ -48,12 +48,13 @@ struct port {
 struct ioport {
     struct port *ports;
     unsigned count;
-    unsigned turn_port, turn, turns; /* whose levels are written next, and turns of a port */
+    uint32_t turn; /* of which bits the levels are written next */
     struct io_setup *setups;
-    unsigned setup_count, next_look;
-    hm2_bit_t nothing;  /* stays 0 */
-    bool first_written; /* deferred outputs have their direction */
-    bool held_off;      /* the watchdog has cleared direction and open drain */
+    unsigned setup_count;
+    const struct io_setup *look; /* at which parameters we look next; NULL when there are none */
+    hm2_bit_t nothing;           /* stays 0 */
+    bool first_written;          /* deferred outputs have their direction */
+    bool held_off;               /* the watchdog has cleared direction and open drain */
     struct hm2_window read, write;
     struct hm2_section invert, alt_source, open_drain, direction;
 };
@@ -143,6 +144,7 @@ static void alias_output(const struct hm2_setup *const setup, const unsigned io)
 static int bind_setup(const struct hm2_setup *const setup, struct ioport *const ctx, const unsigned io)
 {
     struct io_setup *const row = &ctx->setups[ctx->setup_count++];
+    ctx->look = ctx->setups;
     row->port = (uint8_t)(io / setup->idrom->port_width);
     row->bit = (uint8_t)(io % setup->idrom->port_width);
     int err = 0;
@@ -223,7 +225,7 @@ static struct ioport *allocate(const struct hm2_setup *const setup)
         return NULL;
     ctx->ports = ports;
     ctx->count = idrom->io_ports;
-    ctx->turns = hm2_turns(idrom->port_width);
+    ctx->turn = HM2_FIRST_TURN;
     ctx->setups = setups;
     for (unsigned number = 0; number < ctx->count; number++) {
         ports[number].levels = &levels[number * idrom->port_width];
@@ -255,41 +257,18 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 
 /* ---- cycle ------------------------------------------------------------------------------------------------------ */
 
-static void show_all(const struct ioport *const ctx)
-{
-    for (unsigned number = 0; number < ctx->count; number++) {
-        const struct port *const port = &ctx->ports[number];
-        hm2_show_levels(port->levels, port->shown, port->present);
-    }
-}
-
-/* The next few levels are written whether they changed or not. */
-static void take_turn(struct ioport *const ctx)
-{
-    const struct port *const port = &ctx->ports[ctx->turn_port];
-    hm2_show_levels(port->levels, port->shown, HM2_TURN_MASK(ctx->turn) & port->present);
-    if (++ctx->turn >= ctx->turns) {
-        ctx->turn = 0;
-        ctx->turn_port = ctx->turn_port + 1 < ctx->count ? ctx->turn_port + 1 : 0;
-    }
-}
-
 static void unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct ioport *const ctx = module->context;
     const uint8_t *word = ctx->read.bytes;
+    const uint32_t turn = cycle->writes == 0 ? UINT32_MAX : ctx->turn;
+    ctx->turn = hm2_next_turn(ctx->turn);
     for (struct port *port = ctx->ports, *const end = port + ctx->count; port < end; port++, word += 4) {
         const uint32_t levels = hm2_get_le32(word);
-        const uint32_t changed = (levels ^ port->shown) & port->present;
-        if (changed) {
-            hm2_show_levels(port->levels, levels, changed);
-            port->shown = levels;
-        }
+        const uint32_t shown = port->shown;
+        port->shown = levels;
+        hm2_show_levels(port->levels, levels, ((levels ^ shown) | turn) & port->present);
     }
-    if (cycle->writes == 0)
-        show_all(ctx); /* links of the HAL file that loaded us are new */
-    else
-        take_turn(ctx);
 }
 
 /* The first reply: every pin. */
@@ -297,9 +276,11 @@ static void start(struct hm2_module *const module, const struct hm2_cycle *const
 {
     struct ioport *const ctx = module->context;
     (void)cycle;
-    for (unsigned number = 0; number < ctx->count; number++)
-        ctx->ports[number].shown = hm2_window_get(&ctx->read, number);
-    show_all(ctx);
+    for (unsigned number = 0; number < ctx->count; number++) {
+        struct port *const port = &ctx->ports[number];
+        port->shown = hm2_window_get(&ctx->read, number);
+        hm2_show_levels(port->levels, port->shown, port->present);
+    }
 }
 
 static uint8_t look(const struct io_setup *const row)
@@ -309,7 +290,7 @@ static uint8_t look(const struct io_setup *const row)
 
 /* Take all parameters over: at the first write, when one has changed, and when the watchdog bit or was told to forget
  * it. */
-static void take_parameters(struct ioport *const ctx)
+HM2_RARE static void take_parameters(struct ioport *const ctx)
 {
     for (unsigned number = 0; number < ctx->count; number++) {
         struct port *const port = &ctx->ports[number];
@@ -331,12 +312,12 @@ static void take_parameters(struct ioport *const ctx)
 /* Has one of the next few I/Os changed? */
 static bool parameters_changed(struct ioport *const ctx)
 {
-    const unsigned left = ctx->setup_count - ctx->next_look;
-    const unsigned end = left > LOOKS_PER_CYCLE ? ctx->next_look + LOOKS_PER_CYCLE : ctx->setup_count;
     unsigned changed = 0;
-    for (const struct io_setup *row = &ctx->setups[ctx->next_look]; row < &ctx->setups[end]; row++)
+    for (unsigned i = 0; i < LOOKS_PER_CYCLE; i++) {
+        const struct io_setup *const row = ctx->look;
         changed |= (unsigned)look(row) ^ row->seen;
-    ctx->next_look = end < ctx->setup_count ? end : 0;
+        ctx->look = row + 1 < ctx->setups + ctx->setup_count ? row + 1 : ctx->setups;
+    }
     return changed != 0;
 }
 
@@ -350,15 +331,6 @@ static uint32_t outputs(const struct port *const port)
     return data;
 }
 
-static void write_data(struct ioport *const ctx)
-{
-    for (unsigned number = 0; number < ctx->count; number++) {
-        const struct port *const port = &ctx->ports[number];
-        if (port->driven)
-            hm2_window_set(&ctx->write, number, outputs(port));
-    }
-}
-
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct ioport *const ctx = module->context;
@@ -366,10 +338,13 @@ static void pack(struct hm2_module *const module, const struct hm2_cycle *const 
         ctx->first_written = true;
         ctx->held_off = cycle->bitten;
         take_parameters(ctx);
-    } else if (parameters_changed(ctx)) {
+    } else if (ctx->look && parameters_changed(ctx)) {
         take_parameters(ctx);
     }
-    write_data(ctx);
+    uint8_t *word = ctx->write.bytes;
+    for (const struct port *port = ctx->ports, *const end = port + ctx->count; port < end; port++, word += 4)
+        if (port->driven)
+            hm2_put_le32(word, outputs(port));
 }
 
 static const struct hm2_md_variant variants[] = {

@@ -58,16 +58,20 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
     return err;
 }
 
+HM2_RARE static void show(struct leds *const ctx, const uint32_t lit, const bool first)
+{
+    ctx->seen = lit;
+    hm2_section_set(&ctx->data, 0, (uint32_t)((uint64_t)lit << (MAX_LEDS - ctx->gathered))); /* by 32: no LED */
+    if (first)
+        hm2_section_touch(&ctx->data);
+}
+
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct leds *const ctx = module->context;
     const uint32_t lit = hm2_gather(ctx->on, ctx->gathered);
-    if (lit != ctx->seen) {
-        ctx->seen = lit;
-        hm2_section_set(&ctx->data, 0, (uint32_t)((uint64_t)lit << (MAX_LEDS - ctx->gathered))); /* by 32: no LED */
-    }
-    if (cycle->writes == 0)
-        hm2_section_touch(&ctx->data);
+    if (lit != ctx->seen || cycle->writes == 0)
+        show(ctx, lit, cycle->writes == 0);
 }
 
 static const struct hm2_md_variant variants[] = {{.version = 0, .registers = 1, .instance_stride = 4, .multiple = 0}};

@@ -16,24 +16,24 @@ struct hm2_level {
 static inline void hm2_show_levels(const struct hm2_level *const levels, const uint32_t word, uint32_t which)
 {
     for (; which; which &= which - 1) {
-        const unsigned bit = (unsigned)__builtin_ctz(which);
-        const bool level = word >> bit & 1u;
-        *levels[bit].level = level;
-        *levels[bit].inverse = !level;
+        const struct hm2_level *const pins = &levels[__builtin_ctz(which)];
+        const bool level = (word & which & -which) != 0;
+        *pins->level = level;
+        *pins->inverse = !level;
     }
 }
 
 /*
- * Taking turns. A pin is written when its level changed, and otherwise once in a few cycles: a host may link a pin to a
- * signal at any time, and the signal shall soon show the level even if that never changes.
+ * Taking turns. A pin is written when its level changed, in every cycle before the first write, when the links of a HAL
+ * file are new, and otherwise once in 32 cycles: a host may link a pin to a signal at any time, and the signal shall
+ * soon show the level even if that never changes. A turn is one bit of a word, the first is bit 0.
  */
-#define HM2_TURN_BITS       2u
-#define HM2_TURN_MASK(turn) ((uint32_t)((((uint64_t)1 << HM2_TURN_BITS) - 1u) << HM2_TURN_BITS * (turn)))
+#define HM2_FIRST_TURN 1u
+#define HM2_TURNS      32u
 
-/* Turns that a word of this width (up to 32 bits) needs. */
-static inline unsigned hm2_turns(const unsigned width)
+static inline uint32_t hm2_next_turn(const uint32_t turn)
 {
-    return (width + HM2_TURN_BITS - 1u) / HM2_TURN_BITS;
+    return turn << 1 | turn >> (HM2_TURNS - 1u);
 }
 
 /* One pin that the host writes. */
@@ -49,8 +49,10 @@ static inline uint32_t hm2_gather(const struct hm2_bit_in *const pins, const uns
 {
     uint32_t word = 0;
     for (const struct hm2_bit_in *at = pins + count; at > pins; at -= HM2_GATHER) {
-        const unsigned high = (unsigned)*at[-1].bit << 1 | *at[-2].bit, low = (unsigned)*at[-3].bit << 1 | *at[-4].bit;
-        word = word << HM2_GATHER | high << 2 | low;
+        word = 2u * word + *at[-1].bit;
+        word = 2u * word + *at[-2].bit;
+        word = 2u * word + *at[-3].bit;
+        word = 2u * word + *at[-4].bit;
     }
     return word;
 }

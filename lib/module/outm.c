@@ -38,11 +38,9 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct outm *const outms = module->context;
-    for (unsigned unit = 0; unit < module->instances; unit++) {
-        /* A bite clears the register (register map 3.2); it stays so until the bite is acknowledged. */
-        const uint32_t word = cycle->bitten ? 0 : hm2_outputs_word(&outms[unit].outputs);
-        hm2_window_set(&outms[unit].data, 0, word);
-    }
+    /* A bite clears the register (register map 3.2); it stays so until the bite is acknowledged. */
+    for (struct outm *outm = outms, *const end = outms + module->instances; outm < end; outm++)
+        hm2_window_set(&outm->data, 0, cycle->bitten ? 0 : hm2_outputs_word(&outm->outputs));
 }
 
 const struct hm2_module_type hm2_outm_type = {

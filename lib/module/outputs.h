@@ -31,10 +31,12 @@ int HM2_MUST_CHECK hm2_outputs_bind(struct hm2_outputs *outputs, const struct hm
 static inline uint32_t hm2_outputs_word(const struct hm2_outputs *const outputs)
 {
     const struct hm2_output *const first = outputs->output + outputs->first;
-    uint32_t word = 0;
-    for (const struct hm2_output *at = outputs->output + outputs->end; at > first; at--)
-        word = word << 1 | ((unsigned)*at[-1].out ^ *at[-1].invert);
-    return word << outputs->first;
+    uint32_t out = 0, invert = 0;
+    for (const struct hm2_output *at = outputs->output + outputs->end; at > first; at--) {
+        out = 2u * out + *at[-1].out;
+        invert = 2u * invert + *at[-1].invert;
+    }
+    return (out ^ invert) << outputs->first;
 }
 
 #endif

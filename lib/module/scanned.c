@@ -32,13 +32,13 @@ struct instance {
     uint32_t present;                      /* inputs that exist as pins */
     unsigned end;                          /* behind the highest of them, in whole groups of HM2_GATHER */
     uint32_t shown, shown_raw, counts;     /* levels as the pins have them, and counters as they were read last */
-    unsigned turn, turns;
     struct hm2_level filtered[MAX_INPUTS], raw[MAX_INPUTS];
     struct hm2_bit_in slow[MAX_INPUTS]; /* of inputs that do not exist: a constant 0 */
     struct counter counter[COUNTERS];
 };
 
 struct scanned {
+    uint32_t turn; /* inputs whose levels are written next; in the first turn parameters are looked at too */
     uint32_t clock_hz, max_bits_per_s;
     hm2_bit_t nothing; /* stays 0 */
     struct instance *instance;
@@ -139,7 +139,6 @@ static int setup_instance(const struct hm2_module *const module, struct hm2_setu
     for (unsigned i = 0; i < MAX_INPUTS; i++)
         if (!instance->slow[i].bit)
             instance->slow[i].bit = &ctx->nothing;
-    instance->turns = 2u * hm2_turns(instance->end);
     return err;
 }
 
@@ -184,6 +183,7 @@ int hm2_scanned_setup(struct hm2_module *const module, struct hm2_setup *const s
         return HM2_ERR_NOMEM;
     module->context = ctx;
     ctx->instance = instances;
+    ctx->turn = HM2_FIRST_TURN;
     ctx->clock_hz = md->clock_hz;
     ctx->max_bits_per_s = max_bits_per_s;
     int err = hm2_claim_pins(module, setup, HM2_GTAG_NONE, module->instances, true, NULL);
@@ -203,7 +203,7 @@ void hm2_scanned_start(struct hm2_module *const module, const struct hm2_cycle *
 }
 
 /* Four counters of eight bits each; reset holds a count at 0. */
-static void count(struct instance *const instance, const uint32_t counts)
+HM2_RARE static void count(struct instance *const instance, const uint32_t counts)
 {
     for (unsigned i = 0; i < COUNTERS; i++) {
         const struct counter *const counter = &instance->counter[i];
@@ -215,32 +215,27 @@ static void count(struct instance *const instance, const uint32_t counts)
 
 static bool is_reset(const struct instance *const instance)
 {
-    unsigned any = 0;
-    for (unsigned i = 0; i < COUNTERS; i++)
-        any |= *instance->counter[i].reset;
-    return any != 0;
+    const struct counter *const counter = instance->counter;
+    return (*counter[0].reset | *counter[1].reset | *counter[2].reset | *counter[3].reset) != 0;
 }
 
 void hm2_scanned_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct scanned *const ctx = module->context;
+    const uint32_t turn = cycle->writes == 0 ? UINT32_MAX : ctx->turn;
+    ctx->turn = hm2_next_turn(ctx->turn);
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct instance *const instance = &ctx->instance[unit];
         const uint32_t filtered = hm2_window_get(&ctx->filtered, unit);
         const uint32_t raw = hm2_window_get(&ctx->raw, unit);
         const uint32_t counts = hm2_window_get(&ctx->counters, unit);
-        /* Filtered and raw inputs take turns; before the first write, when links may be new, it is everybody's. */
-        const uint32_t turn = cycle->writes == 0 ? UINT32_MAX : HM2_TURN_MASK(instance->turn / 2u);
-        const uint32_t filtered_turn = instance->turn % 2u == 0 || cycle->writes == 0 ? turn : 0;
-        const uint32_t raw_turn = instance->turn % 2u == 1 || cycle->writes == 0 ? turn : 0;
-        hm2_show_levels(instance->filtered, filtered,
-                        ((filtered ^ instance->shown) | filtered_turn) & instance->present);
-        hm2_show_levels(instance->raw, raw, ((raw ^ instance->shown_raw) | raw_turn) & instance->present);
+        const uint32_t filtered_changed = filtered ^ instance->shown, raw_changed = raw ^ instance->shown_raw;
         instance->shown = filtered;
         instance->shown_raw = raw;
+        hm2_show_levels(instance->filtered, filtered, (filtered_changed | turn) & instance->present);
+        hm2_show_levels(instance->raw, raw, (raw_changed | turn) & instance->present);
         if (counts != instance->counts || is_reset(instance))
             count(instance, counts);
-        instance->turn = instance->turn + 1 < instance->turns ? instance->turn + 1 : 0;
     }
 }
 
@@ -281,14 +276,17 @@ static uint32_t modes_word(const struct instance *const instance)
     return word;
 }
 
-static void pack_parameters(const struct hm2_module *const module, const unsigned unit, const bool first)
+/* Parameters are only set by people: looked at in one turn of a round. */
+HM2_RARE static void pack_parameters(const struct hm2_module *const module, const bool first)
 {
     struct scanned *const ctx = module->context;
-    const struct instance *const instance = &ctx->instance[unit];
-    hm2_section_set(&ctx->modes, unit, modes_word(instance));
-    if (first || *instance->scan_rate != instance->for_rate || *instance->fast_scans != instance->for_fast ||
-        *instance->slow_scans != instance->for_slow)
-        hm2_section_set(&ctx->control, unit, control_word(module, unit));
+    for (unsigned unit = 0; unit < module->instances; unit++) {
+        const struct instance *const instance = &ctx->instance[unit];
+        hm2_section_set(&ctx->modes, unit, modes_word(instance));
+        if (first || *instance->scan_rate != instance->for_rate || *instance->fast_scans != instance->for_fast ||
+            *instance->slow_scans != instance->for_slow)
+            hm2_section_set(&ctx->control, unit, control_word(module, unit));
+    }
 }
 
 void hm2_scanned_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -297,8 +295,7 @@ void hm2_scanned_pack(struct hm2_module *const module, const struct hm2_cycle *c
     for (unsigned unit = 0; unit < module->instances; unit++) {
         const struct instance *const instance = &ctx->instance[unit];
         hm2_window_set(&ctx->filter_select, unit, hm2_gather(instance->slow, instance->end));
-        /* Parameters are only set by people: looked at in one turn of a round. */
-        if (instance->turn == 0 || cycle->writes == 0)
-            pack_parameters(module, unit, cycle->writes == 0);
     }
+    if (ctx->turn == HM2_FIRST_TURN || cycle->writes == 0)
+        pack_parameters(module, cycle->writes == 0);
 }

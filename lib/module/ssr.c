@@ -101,16 +101,26 @@ static void set_rate(const struct hm2_module *const module, struct ssr *const ss
     hm2_section_set(&ssr->rate_section, 0, rate_value(ctx->clock_hz, rate_hz));
 }
 
+HM2_RARE static void set_rates(const struct hm2_module *const module, const bool first)
+{
+    const struct ssrs *const ctx = module->context;
+    for (struct ssr *ssr = ctx->ssr, *const end = ssr + module->instances; ssr < end; ssr++) {
+        const uint32_t rate_hz = *ssr->rate;
+        if (first || rate_hz != ssr->register_for_hz)
+            set_rate(module, ssr, rate_hz);
+    }
+}
+
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     const struct ssrs *const ctx = module->context;
-    for (unsigned unit = 0; unit < module->instances; unit++) {
-        struct ssr *const ssr = &ctx->ssr[unit];
-        const uint32_t rate_hz = *ssr->rate;
+    uint32_t changed = cycle->writes == 0;
+    for (struct ssr *ssr = ctx->ssr, *const end = ssr + module->instances; ssr < end; ssr++) {
         hm2_window_set(&ssr->data, 0, hm2_outputs_word(&ssr->outputs));
-        if (rate_hz != ssr->register_for_hz || cycle->writes == 0)
-            set_rate(module, ssr, rate_hz);
+        changed |= *ssr->rate ^ ssr->register_for_hz;
     }
+    if (changed)
+        set_rates(module, cycle->writes == 0);
 }
 
 const struct hm2_module_type hm2_ssr_type = {

@@ -78,7 +78,7 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
     return err;
 }
 
-static void bite(struct watchdog *const ctx)
+HM2_RARE static void bite(struct watchdog *const ctx)
 {
     ctx->dog = DOG_HAS_BITTEN;
     *ctx->has_bit = true;
@@ -101,8 +101,8 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
 }
 
 /* N for a time-out of (N + 1) clocks (register map 3.2). */
-static void set_timer(const struct hm2_module *const module, const struct hm2_cycle *const cycle,
-                      const uint32_t timeout_ns)
+HM2_RARE static void set_timer(const struct hm2_module *const module, const struct hm2_cycle *const cycle,
+                               const uint32_t timeout_ns)
 {
     struct watchdog *const ctx = module->context;
     const uint64_t clocks = (uint64_t)timeout_ns * ctx->clock_hz / NS_PER_S;

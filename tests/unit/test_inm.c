@@ -158,7 +158,7 @@ static void inputs_that_never_change_are_written_at_once_at_first_and_then_in_tu
             (void)snprintf(name, sizeof name, "inm.00.%sinput-%02u", input < 11 ? "" : "raw-", input % 11);
             rig_set(rig, name, 0);
         }
-        rig_cycles(rig, first == 0 ? 1 : 12);
+        rig_cycles(rig, first == 0 ? 1 : ALL_TURNS);
         for (unsigned input = 0; input < 22; input++) {
             char name[64];
             (void)snprintf(name, sizeof name, "inm.00.%sinput-%02u", input < 11 ? "" : "raw-", input % 11);

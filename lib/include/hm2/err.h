@@ -14,6 +14,9 @@
 
 #define HM2_API        __attribute__((visibility("default")))
 #define HM2_MUST_CHECK __attribute__((warn_unused_result))
+/* A function of the cycle that is seldom called: it must not cost its callers registers to save and code to pass over.
+ */
+#define HM2_RARE __attribute__((noinline, cold))
 
 enum hm2_err {
     HM2_OK = 0,
