@@ -20,11 +20,6 @@ static int32_t at_least_one(const int32_t value)
     return value < 1 ? 1 : value;
 }
 
-bool board_level_exceeded(const struct hm2_board *const board)
-{
-    return *board->points->error_level >= at_least_one(*board->points->error_limit);
-}
-
 static struct board_event counters(const struct hm2_board *const board)
 {
     const struct board_points *const p = board->points;

@@ -125,6 +125,11 @@ struct board_calls {
     } call[BOARD_MODULES];
 };
 
+struct board_buffer {
+    uint8_t *bytes;
+    size_t size;
+};
+
 enum board_state { BOARD_NEW, BOARD_IDENTIFIED, BOARD_SET_UP, BOARD_RUNS, BOARD_STOPPED };
 
 struct hm2_board {
@@ -145,12 +150,15 @@ struct hm2_board {
     struct hm2_module modules[BOARD_MODULES]; /* in the order of hm2_module_types[] */
     struct hm2_module *watchdog;              /* NULL = the firmware has none */
     struct board_calls unpacks, packs;
+    struct board_buffer reply; /* of the plan */
     struct hm2_plan *plan;
     struct board_points *points;
 
     /* the cycle */
     bool outstanding, sent; /* a request waits for read(); it could be sent */
     int64_t request_ns, period_ns;
+    int64_t read_limit_ns, limit_for_period_ns; /* how long a reply is waited for, and what that was computed from */
+    int32_t limit_for_setting;
     struct hm2_cycle cycle;   /* as the modules are told */
     uint32_t writes;          /* since start() or since the card came back */
     int64_t write_ns;         /* when the last write was sent, valid with writes > 0 */
@@ -176,8 +184,6 @@ struct hm2_board {
 /* Account for a cycle (hal-interface 3.5). Returns with io_error set when the level has reached its limit. */
 void board_cycle_failed(struct hm2_board *board, bool raise_level);
 void board_cycle_good(struct hm2_board *board);
-/* Has the level reached its limit? */
-bool board_level_exceeded(const struct hm2_board *board);
 /* Time after the request at which a reply is given up (hal-interface 3.4). */
 int64_t board_read_limit_ns(int32_t setting, int64_t period_ns);
 

@@ -42,11 +42,29 @@ static void call_all(const struct board_calls *const calls, const struct hm2_cyc
 /* ---- request ------------------------------------------------------------------------------------------------------
  */
 
-static void send_request(struct hm2_board *const board)
+static bool level_exceeded(const struct hm2_board *const board)
 {
+    const int32_t level = *board->points->error_level;
+    return level > 0 && level >= *board->points->error_limit;
+}
+
+/* A person has cleared io_error (hal-interface 3.5). */
+HM2_RARE static void start_again(struct hm2_board *const board)
+{
+    *board->points->error_level = 0;
+    /* While nothing was sent the card may have become another. */
+    if (board->recovery == BOARD_RESTORES)
+        board->recovery = BOARD_ASKS_IDENTITY;
+}
+
+static inline void send_request(struct hm2_board *const board, const int64_t period_ns)
+{
+    if (level_exceeded(board))
+        start_again(board);
     const bool identity = board->recovery == BOARD_ASKS_IDENTITY;
     size_t len = board->identity.builder.used;
     const uint8_t *const bytes = identity ? board_recovery_request(board) : hm2_plan_request(board->plan, &len);
+    board->period_ns = period_ns > 0 ? period_ns : DEFAULT_PERIOD_NS;
     board->notices.now_ns = board->request_ns = link_now_ns(board->link);
     board->sent = link_send(board->link, bytes, len) == 0;
     board->outstanding = true;
@@ -54,17 +72,8 @@ static void send_request(struct hm2_board *const board)
 
 void hm2_board_request(struct hm2_board *const board, const int64_t period_ns)
 {
-    if (is_stopped(board) || board->outstanding)
-        return;
-    /* A person has cleared io_error (hal-interface 3.5). */
-    if (board_level_exceeded(board)) {
-        *board->points->error_level = 0;
-        /* While nothing was sent the card may have become another. */
-        if (board->recovery == BOARD_RESTORES)
-            board->recovery = BOARD_ASKS_IDENTITY;
-    }
-    board->period_ns = period_ns > 0 ? period_ns : DEFAULT_PERIOD_NS;
-    send_request(board);
+    if (!is_stopped(board) && !board->outstanding)
+        send_request(board, period_ns);
 }
 
 bool hm2_board_request_outstanding(const struct hm2_board *const board)
@@ -103,20 +112,36 @@ static bool judge_identity(struct hm2_board *const board, const size_t len)
     return fresh;
 }
 
-static bool receive(struct hm2_board *const board, int64_t clock_ns)
+HM2_RARE static void take_read_limit(struct hm2_board *const board, const int32_t setting)
 {
-    const bool identity = board->recovery == BOARD_ASKS_IDENTITY;
-    uint8_t *const buffer = identity ? board->identity.reply : hm2_plan_reply_buffer(board->plan);
-    const size_t capacity = identity ? sizeof board->identity.reply : hm2_plan_reply_capacity(board->plan);
-    const int64_t deadline_ns = board->request_ns + board_read_limit_ns(*board->points->read_timeout, board->period_ns);
+    board->limit_for_setting = setting;
+    board->limit_for_period_ns = board->period_ns;
+    board->read_limit_ns = board_read_limit_ns(setting, board->period_ns);
+}
+
+static int64_t deadline_ns(struct hm2_board *const board)
+{
+    const int32_t setting = *board->points->read_timeout;
+    if (setting != board->limit_for_setting || board->period_ns != board->limit_for_period_ns)
+        take_read_limit(board, setting);
+    return board->request_ns + board->read_limit_ns;
+}
+
+/* Wait for the reply that judge_() takes. clock_ns: see link.h. */
+static inline bool receive(struct hm2_board *const board, const struct board_buffer into, int64_t clock_ns,
+                           bool (*const judge_)(struct hm2_board *board, size_t len))
+{
+    const int64_t end_ns = deadline_ns(board);
     for (unsigned i = 0; i < BOARD_MAX_DATAGRAMS; i++, clock_ns = LINK_CLOCK_UNREAD) {
-        const int len = link_recv_from(board->link, buffer, capacity, deadline_ns, clock_ns);
-        if (len == HM2_ERR_TIMEOUT)
+        const int len = link_recv_from(board->link, into.bytes, into.size, end_ns, clock_ns);
+        if (len >= 0) {
+            if (judge_(board, (size_t)len))
+                return true;
+        } else if (len == HM2_ERR_TIMEOUT) {
             return false;
-        if (len == HM2_ERR_NOSPACE)
+        } else if (len == HM2_ERR_NOSPACE) {
             count(board->points->malformed);
-        else if (len >= 0 && (identity ? judge_identity(board, (size_t)len) : judge(board, (size_t)len)))
-            return true;
+        }
     }
     return false;
 }
@@ -150,7 +175,7 @@ static void unpack_all(struct hm2_board *const board)
     *board->points->data_age = 0;
 }
 
-static void tell_write_lost(struct hm2_board *const board)
+HM2_RARE static void tell_write_lost(struct hm2_board *const board)
 {
     count(board->points->write_lost);
     note_loss(board);
@@ -159,21 +184,31 @@ static void tell_write_lost(struct hm2_board *const board)
             board->modules[i].type->write_lost(&board->modules[i]);
 }
 
+HM2_RARE static void restore(struct hm2_board *const board, const bool write_confirmed)
+{
+    if (write_confirmed && (hm2_plan_settled(board->plan) || board->writes >= MAX_RESTORE_WRITES))
+        board_recovery_end(board);
+    board_cycle_failed(board, !write_confirmed);
+}
+
+HM2_RARE static void lose_session(struct hm2_board *const board)
+{
+    board_recovery_begin(board);
+    board_cycle_failed(board, false);
+}
+
 /* The reply is fresh: what does it tell about our last write and about the card's life? */
 static void use_reply(struct hm2_board *const board)
 {
     const struct hm2_plan_facts facts = hm2_plan_facts(board->plan);
     if (!facts.session_kept) {
-        board_recovery_begin(board);
-        board_cycle_failed(board, false);
+        lose_session(board);
         return;
     }
     if (!facts.write_confirmed)
         tell_write_lost(board);
     if (board->recovery == BOARD_RESTORES) {
-        if (facts.write_confirmed && (hm2_plan_settled(board->plan) || board->writes >= MAX_RESTORE_WRITES))
-            board_recovery_end(board);
-        board_cycle_failed(board, !facts.write_confirmed);
+        restore(board, facts.write_confirmed);
         return;
     }
     unpack_all(board);
@@ -192,6 +227,27 @@ static void give_up(struct hm2_board *const board)
     board->outstanding = false;
 }
 
+HM2_RARE static void lose_reply(struct hm2_board *const board)
+{
+    give_up(board);
+    count(board->points->lost);
+    note_loss(board);
+    board_cycle_failed(board, true);
+}
+
+HM2_RARE static void read_identity(struct hm2_board *const board)
+{
+    const struct board_buffer into = {board->identity.reply, sizeof board->identity.reply};
+    if (!board->sent || !receive(board, into, LINK_CLOCK_UNREAD, judge_identity)) {
+        lose_reply(board);
+        return;
+    }
+    board->outstanding = false;
+    measure_round_trip(board);
+    board_recovery_identified(board);
+    board_cycle_failed(board, false);
+}
+
 void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
 {
     if (is_stopped(board)) {
@@ -201,26 +257,19 @@ void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
     }
     int64_t clock_ns = LINK_CLOCK_UNREAD;
     if (!board->outstanding) {
-        hm2_board_request(board, period_ns);
+        send_request(board, period_ns);
         clock_ns = board->request_ns;
     }
-    const struct board_points *const p = board->points;
     board->cycles++;
-    count(p->data_age);
-    *p->strangers = (uint32_t)__atomic_load_n(&board->link->counters.strangers, __ATOMIC_RELAXED);
-    if (!board->sent || !receive(board, clock_ns)) {
-        give_up(board);
-        count(p->lost);
-        note_loss(board);
-        board_cycle_failed(board, true);
-        return;
-    }
-    board->outstanding = false;
-    measure_round_trip(board);
+    count(board->points->data_age);
+    *board->points->strangers = (uint32_t)link_strangers(board->link);
     if (board->recovery == BOARD_ASKS_IDENTITY) {
-        board_recovery_identified(board);
-        board_cycle_failed(board, false);
+        read_identity(board);
+    } else if (!board->sent || !receive(board, board->reply, clock_ns, judge)) {
+        lose_reply(board);
     } else {
+        board->outstanding = false;
+        measure_round_trip(board);
         use_reply(board);
     }
 }

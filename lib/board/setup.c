@@ -251,8 +251,9 @@ static void add_call(struct board_calls *const calls, struct hm2_module *const m
         calls->call[calls->count++] = (struct board_call){function, module};
 }
 
-static void list_calls(struct hm2_board *const board)
+static void prepare_cycle(struct hm2_board *const board)
 {
+    board->reply = (struct board_buffer){hm2_plan_reply_buffer(board->plan), hm2_plan_reply_capacity(board->plan)};
     for (unsigned i = 0; i < board->module_count; i++) {
         struct hm2_module *const module = &board->modules[i];
         add_call(&board->unpacks, module, module->type->unpack);
@@ -283,7 +284,7 @@ static int create_objects(struct hm2_board *const board, struct hm2_binder *cons
         err = setup_modules(board, &setup);
     if (err == 0)
         err = hm2_plan_freeze(board->plan, diag);
-    list_calls(board);
+    prepare_cycle(board);
     return err;
 }
 

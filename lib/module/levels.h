@@ -16,10 +16,10 @@ struct hm2_level {
 static inline void hm2_show_levels(const struct hm2_level *const levels, const uint32_t word, uint32_t which)
 {
     for (; which; which &= which - 1) {
-        const struct hm2_level *const pins = &levels[__builtin_ctz(which)];
-        const bool level = (word & which & -which) != 0;
-        *pins->level = level;
-        *pins->inverse = !level;
+        const unsigned bit = (unsigned)__builtin_ctz(which), level = word >> bit & 1u;
+        const struct hm2_level *const pins = &levels[bit];
+        *pins->level = (bool)level;
+        *pins->inverse = (bool)(level ^ 1u);
     }
 }
 

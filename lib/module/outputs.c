@@ -31,9 +31,11 @@ int hm2_outputs_bind(struct hm2_outputs *const outputs, const struct hm2_module 
     int err = 0;
     if (numbers == 0)
         return 0;
-    outputs->first = (unsigned)__builtin_ctz(numbers);
-    outputs->end = HM2_OUTPUTS - (unsigned)__builtin_clz(numbers);
-    for (unsigned number = outputs->first; err == 0 && number < outputs->end; number++) {
+    const unsigned end = HM2_OUTPUTS - (unsigned)__builtin_clz(numbers);
+    outputs->number = (unsigned)__builtin_ctz(numbers);
+    outputs->first = &outputs->output[outputs->number];
+    outputs->end = outputs->output + end;
+    for (unsigned number = outputs->number; err == 0 && number < end; number++) {
         struct hm2_output *const output = &outputs->output[number];
         if (numbers >> number & 1u)
             err = hm2_bind_item(setup, group, output, unit, number);

@@ -11,9 +11,10 @@ struct hm2_output {
     hm2_bit_t *out, *invert;
 };
 
-/* Outputs of one instance: those from number `first` to before `end`. */
+/* Outputs of one instance, from the first that has a pin descriptor to before `end`. */
 struct hm2_outputs {
-    unsigned first, end;
+    const struct hm2_output *first, *end;  /* in output */
+    unsigned number;                       /* of the first */
     hm2_bit_t nothing;                     /* stays 0: pins of an output between that has no pin descriptor */
     struct hm2_output output[HM2_OUTPUTS]; /* by number */
 };
@@ -30,13 +31,13 @@ int HM2_MUST_CHECK hm2_outputs_bind(struct hm2_outputs *outputs, const struct hm
 /* Data word: out xor invert (hal-interface 2.12). */
 static inline uint32_t hm2_outputs_word(const struct hm2_outputs *const outputs)
 {
-    const struct hm2_output *const first = outputs->output + outputs->first;
+    const struct hm2_output *const first = outputs->first;
     uint32_t out = 0, invert = 0;
-    for (const struct hm2_output *at = outputs->output + outputs->end; at > first; at--) {
+    for (const struct hm2_output *at = outputs->end; at > first; at--) {
         out = 2u * out + *at[-1].out;
         invert = 2u * invert + *at[-1].invert;
     }
-    return (out ^ invert) << outputs->first;
+    return (out ^ invert) << outputs->number;
 }
 
 #endif
