@@ -216,7 +216,8 @@ HM2_RARE static void count(struct instance *const instance, const uint32_t count
 static bool is_reset(const struct instance *const instance)
 {
     const struct counter *const counter = instance->counter;
-    return (*counter[0].reset | *counter[1].reset | *counter[2].reset | *counter[3].reset) != 0;
+    return ((unsigned)*counter[0].reset | (unsigned)*counter[1].reset | (unsigned)*counter[2].reset |
+            (unsigned)*counter[3].reset) != 0;
 }
 
 void hm2_scanned_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
