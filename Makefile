@@ -119,9 +119,11 @@ $(HOST_A): $(HOST_OBJ)
 %.a:
 	$(call say,AR,$@)rm -f $@ && $(AR) rcs $@ $^
 
+# Everything it uses is in itself and in the libraries named; a sanitizer's run-time library comes with the program.
+comma := ,
 $(LIB_SO): $(LIB_OBJ) lib/libhm2.map
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -shared -Wl,-soname,libhm2.so.$(SOVERSION) \
-		-Wl,--version-script,lib/libhm2.map -Wl,-z,defs -o $@ $(LIB_OBJ) -lm -lpthread
+		-Wl,--version-script,lib/libhm2.map $(if $(SANITIZE),,-Wl$(comma)-z$(comma)defs) -o $@ $(LIB_OBJ) -lm -lpthread
 	@ln -sf $(@F) $(BUILDDIR)/libhm2.so
 
 # What has a folder of the installation in it is made anew when the folder changes ("make", then "make install prefix=").
@@ -225,7 +227,9 @@ $(SYSTEM_BIN): | $(if $(shell command -v $(halcompile)),$(LINUXCNC_SO))
 # These load the test components.
 $(BUILDDIR)/unit/test_halhost $(BUILDDIR)/system/check_hm2host: | $(TEST_COMPONENT_SO)
 
-check: check-unit check-system ## run all tests; ends with "N passed, N failed, N skipped"
+check: all $(UNIT_BIN) $(SYSTEM_BIN) ## run all tests; ends with "N passed, N failed, N skipped"
+	@scripts/run-tests $(BUILDDIR) unit $(UNIT_BIN)
+	@scripts/run-tests $(BUILDDIR) system $(SYSTEM_BIN)
 	@scripts/run-tests --summary $(BUILDDIR)
 
 check-unit: $(UNIT_BIN) all

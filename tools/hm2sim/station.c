@@ -34,19 +34,6 @@ static void deliver(void *const context, const uint64_t client, const uint8_t *c
         s->replies++;
 }
 
-void station_receive(struct station *const s, const int64_t now_ns)
-{
-    uint8_t data[2048];
-    struct sockaddr_in from = {.sin_family = AF_INET};
-    socklen_t from_len = sizeof from;
-    const ssize_t len =
-        recvfrom(s->socket, data, sizeof data, MSG_DONTWAIT | MSG_TRUNC, (struct sockaddr *)&from, &from_len);
-    if (len < 0 || (size_t)len > sizeof data)
-        return;
-    s->requests++;
-    sim_net_arrive(s->net, now_ns, client_number(&from), data, (size_t)len);
-}
-
 /* ---- what the world does by itself --------------------------------------------------------------------------------
  */
 
@@ -63,6 +50,20 @@ static void drive_patterns(struct station *const s, const int64_t now_ns)
             s->pattern_due_ns[i] = p->count > 1 ? due_ns + p->step_ns : INT64_MAX;
         }
     }
+}
+
+void station_receive(struct station *const s, const int64_t now_ns)
+{
+    uint8_t data[2048];
+    struct sockaddr_in from = {.sin_family = AF_INET};
+    socklen_t from_len = sizeof from;
+    const ssize_t len =
+        recvfrom(s->socket, data, sizeof data, MSG_DONTWAIT | MSG_TRUNC, (struct sockaddr *)&from, &from_len);
+    if (len < 0 || (size_t)len > sizeof data)
+        return;
+    s->requests++;
+    drive_patterns(s, now_ns); /* what was due before it came has happened, whichever the loop looked at first */
+    sim_net_arrive(s->net, now_ns, client_number(&from), data, (size_t)len);
 }
 
 void station_run(struct station *const s, const int64_t now_ns)
