@@ -118,6 +118,35 @@ START_TEST(installing_puts_every_module_where_linuxcnc_loads_from_and_uninstalli
 }
 END_TEST
 
+/* A tree that runs in place and an installed one: both folders are in the same Makefile.modinc. */
+START_TEST(of_the_folders_that_makefile_modinc_sets_the_one_that_counts_is_taken)
+{
+    expect_silence(
+        "set -e; work=$(mktemp -d); trap 'rm -r $work' EXIT; mkdir $work/include; touch $work/include/hal.h\n"
+        "printf '#!/bin/sh\\necho %s/$1.inc\\n' $work >$work/halcompile; chmod +x $work/halcompile\n"
+        "for in_place in yes no; do\n"
+        "cat >$work/--print-modinc.inc <<END\n"
+        "RUN_IN_PLACE=$in_place\n"
+        "ifeq (\\$(RUN_IN_PLACE),yes)\n"
+        "EXTRA_CFLAGS := -O9 -DRTAPI -Irelative -I$work/include\n"
+        "RTLIBDIR := /in/place\n"
+        "else\n"
+        "EXTRA_CFLAGS := -DRTAPI -I/nowhere\n"
+        "RTLIBDIR := /in/stalled\n"
+        "endif\n"
+        "END\n"
+        "ask() { HALCOMPILE=$work/halcompile $SOURCE/scripts/linuxcnc-dev $1 2>&1 || :; }\n"
+        "ask modules; ask flags | grep -v 'linuxcnc-uspace-dev\\|source tree'; done >$work/answers\n"
+        "cat >$work/expected <<END\n"
+        "/in/place\n"
+        "-DRTAPI -isystem $work/include\n"
+        "/in/stalled\n"
+        "LinuxCNC's development files are missing: no folder that $work/--print-modinc.inc names has hal.h\n"
+        "END\n"
+        "diff $work/expected $work/answers");
+}
+END_TEST
+
 START_TEST(no_module_has_the_name_of_one_of_linuxcncs_own)
 {
     if (!process_find("dpkg") || !process_find("halrun")) {
@@ -299,6 +328,7 @@ int main(void)
     tcase_set_timeout(tests, 120);
     tcase_add_test(tests, what_is_built_is_what_there_are_sources_for_and_what_this_test_loads);
     tcase_add_test(tests, installing_puts_every_module_where_linuxcnc_loads_from_and_uninstalling_takes_it_away);
+    tcase_add_test(tests, of_the_folders_that_makefile_modinc_sets_the_one_that_counts_is_taken);
     tcase_add_test(tests, no_module_has_the_name_of_one_of_linuxcncs_own);
     tcase_add_test(tests, without_linuxcncs_development_files_the_build_says_which_package_has_them);
     tcase_add_test(tests, a_module_shows_its_entry_points_and_module_information_and_nothing_else);
