@@ -83,6 +83,45 @@ const struct hm2_point hm2_scanned_counter_points[HM2_SCANNED_COUNTER_ROWS] = {
 
 enum { GROUP_MODULE, GROUP_FILTERED, GROUP_RAW, GROUP_SLOW, GROUP_COUNTER };
 
+/* ---- parameters ------------------------------------------------------------------------------------------------- */
+
+/* Bring a parameter into its limits and show what is really used. */
+static uint32_t limit(const struct hm2_module *const module, hm2_u32_t *const parameter, const uint32_t lowest,
+                      const uint32_t highest, const unsigned unit)
+{
+    const uint32_t wanted = *parameter;
+    const uint32_t used = wanted < lowest ? lowest : wanted > highest ? highest : wanted;
+    if (used != wanted) {
+        *parameter = used;
+        hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, unit, wanted);
+    }
+    return used;
+}
+
+static uint32_t control_word(const struct hm2_module *const module, const unsigned unit)
+{
+    const struct scanned *const ctx = module->context;
+    struct instance *const instance = &ctx->instance[unit];
+    /* The lowest rate that the divisor can make, rounded up. */
+    const uint32_t clocks_per_scan = CLOCKS_PER_STEP * instance->width; /* 4..128 */
+    const uint32_t slowest = ctx->clock_hz / (clocks_per_scan * (DIVISOR_MAX + 1u)) + 1u;
+    instance->for_rate = limit(module, instance->scan_rate, slowest, ctx->max_bits_per_s / instance->width, unit);
+    instance->for_fast = limit(module, instance->fast_scans, 1, FAST_MAX, unit);
+    instance->for_slow = limit(module, instance->slow_scans, 1, SLOW_MAX, unit);
+    const uint64_t clocks = (uint64_t)clocks_per_scan * instance->for_rate; /* the rate is at least 1 */
+    const uint32_t divisor = (uint32_t)(ctx->clock_hz / clocks);
+    const uint32_t field = divisor == 0 ? 0 : divisor - 1u > DIVISOR_MAX ? DIVISOR_MAX : divisor - 1u;
+    return CONTROL_INVERT | field << 6 | instance->for_fast << 16 | instance->for_slow << 22;
+}
+
+static uint32_t modes_word(const struct instance *const instance)
+{
+    uint32_t word = 0;
+    for (unsigned i = 0; i < COUNTERS; i++)
+        word |= (uint32_t)*instance->counter[i].mode_4x << 8 * i;
+    return word;
+}
+
 /* ---- set-up ----------------------------------------------------------------------------------------------------- */
 
 /* Inputs that pin descriptors name: codes 1 to 32 are inputs 0 to 31 (register map 4.2). */
@@ -189,7 +228,12 @@ int hm2_scanned_setup(struct hm2_module *const module, struct hm2_setup *const s
     int err = hm2_claim_pins(module, setup, HM2_GTAG_NONE, module->instances, true, NULL);
     for (unsigned unit = 0; err == 0 && unit < module->instances; unit++)
         err = setup_instance(module, setup, unit, inputs);
-    return err == 0 ? add_registers(ctx, module, setup) : err;
+    if (err == 0)
+        err = add_registers(ctx, module, setup);
+    /* From load on: without the inversion in the control word the first inputs that HAL sees would be upside down. */
+    for (unsigned unit = 0; err == 0 && unit < module->instances; unit++)
+        hm2_section_set(&ctx->control, unit, control_word(module, unit));
+    return err;
 }
 
 /* ---- cycle ------------------------------------------------------------------------------------------------------ */
@@ -235,46 +279,12 @@ void hm2_scanned_unpack(struct hm2_module *const module, const struct hm2_cycle 
         instance->shown_raw = raw;
         hm2_show_levels(instance->filtered, filtered, (filtered_changed | turn) & instance->present);
         hm2_show_levels(instance->raw, raw, (raw_changed | turn) & instance->present);
-        if (counts != instance->counts || is_reset(instance))
+        /* Before the first write the filters are settling since load: what the counters do then is not a wheel. */
+        if (cycle->writes == 0)
+            instance->counts = counts;
+        else if (counts != instance->counts || is_reset(instance))
             count(instance, counts);
     }
-}
-
-/* Bring a parameter into its limits and show what is really used. */
-static uint32_t limit(const struct hm2_module *const module, hm2_u32_t *const parameter, const uint32_t lowest,
-                      const uint32_t highest, const unsigned unit)
-{
-    const uint32_t wanted = *parameter;
-    const uint32_t used = wanted < lowest ? lowest : wanted > highest ? highest : wanted;
-    if (used != wanted) {
-        *parameter = used;
-        hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, unit, wanted);
-    }
-    return used;
-}
-
-static uint32_t control_word(const struct hm2_module *const module, const unsigned unit)
-{
-    const struct scanned *const ctx = module->context;
-    struct instance *const instance = &ctx->instance[unit];
-    /* The lowest rate that the divisor can make, rounded up. */
-    const uint32_t clocks_per_scan = CLOCKS_PER_STEP * instance->width; /* 4..128 */
-    const uint32_t slowest = ctx->clock_hz / (clocks_per_scan * (DIVISOR_MAX + 1u)) + 1u;
-    instance->for_rate = limit(module, instance->scan_rate, slowest, ctx->max_bits_per_s / instance->width, unit);
-    instance->for_fast = limit(module, instance->fast_scans, 1, FAST_MAX, unit);
-    instance->for_slow = limit(module, instance->slow_scans, 1, SLOW_MAX, unit);
-    const uint64_t clocks = (uint64_t)clocks_per_scan * instance->for_rate; /* the rate is at least 1 */
-    const uint32_t divisor = (uint32_t)(ctx->clock_hz / clocks);
-    const uint32_t field = divisor == 0 ? 0 : divisor - 1u > DIVISOR_MAX ? DIVISOR_MAX : divisor - 1u;
-    return CONTROL_INVERT | field << 6 | instance->for_fast << 16 | instance->for_slow << 22;
-}
-
-static uint32_t modes_word(const struct instance *const instance)
-{
-    uint32_t word = 0;
-    for (unsigned i = 0; i < COUNTERS; i++)
-        word |= (uint32_t)*instance->counter[i].mode_4x << 8 * i;
-    return word;
 }
 
 /* Parameters are only set by people: looked at in one turn of a round. */
