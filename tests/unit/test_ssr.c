@@ -83,21 +83,21 @@ static void outputs_are_value_xor_inversion_in_every_cycle(void **state)
     rig_free(rig);
 }
 
-static void rates_follow_the_formula_and_are_brought_into_their_limits(void **state)
+static void rates_follow_the_formula_within_their_limits(void **state)
 {
     (void)state;
     static const struct {
-        double wanted, shown;
+        double wanted;
         uint32_t value;
     } rows[] = {
-        {0, 0, 0},
-        {25000, 25000, 0x1000 | 1998},
-        {24999, 25000, 0x1000 | 1998},
-        {1, 25000, 0x1000 | 1998},
-        {100000, 1e5, 0x1000 | 498},
-        {25000000, 25e6, 0x1000},
-        {25000001, 25e6, 0x1000},
-        {4294967295.0, 25e6, 0x1000},
+        {0, 0},
+        {25000, 0x1000 | 1998},
+        {24999, 0x1000 | 1998},
+        {1, 0x1000 | 1998},
+        {100000, 0x1000 | 498},
+        {25000000, 0x1000},
+        {25000001, 0x1000},
+        {4294967295.0, 0x1000},
     };
     struct hm2_module *ssr;
     struct module_rig *const rig = started(rig_image_7i96s(), "", &ssr);
@@ -106,7 +106,7 @@ static void rates_follow_the_formula_and_are_brought_into_their_limits(void **st
         rig_set(rig, "ssr.00.rate", rows[i].wanted);
         rig_cycles(rig, 2);
         assert_int_equal(rig_written(rig, RATE(0)), rows[i].value);
-        assert_true(rig_get(rig, "ssr.00.rate") == rows[i].shown);
+        assert_true(rig_get(rig, "ssr.00.rate") == rows[i].wanted); /* pins are not rewritten */
     }
     assert_int_equal(ssr->noticed[HM2_NOTICE_VALUE_CLAMPED], 4);
     rig_free(rig);
@@ -170,7 +170,7 @@ int main(void)
         cmocka_unit_test(both_registers_are_zero_until_the_first_write),
         cmocka_unit_test(the_default_rate_is_0x1030_and_is_written_after_the_ports),
         cmocka_unit_test(outputs_are_value_xor_inversion_in_every_cycle),
-        cmocka_unit_test(rates_follow_the_formula_and_are_brought_into_their_limits),
+        cmocka_unit_test(rates_follow_the_formula_within_their_limits),
         cmocka_unit_test(every_instance_has_its_own_address_and_outputs),
         cmocka_unit_test(a_slow_divisor_stays_below_the_carry),
         cmocka_unit_test(pins_of_unused_instances_stay_gpio),
