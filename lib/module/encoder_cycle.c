@@ -87,8 +87,8 @@ static void moved(struct encoder *const enc, const struct encoder_module *const 
 {
     const uint64_t edge = edge_time(ctx, count);
     const double since_s = seconds(ctx, enc->edge_ticks, edge);
-    /* One count forth and back on the same edge is vibration, not motion. */
-    const bool dithers = (counts == 1 || counts == -1) && enc->edge_counts == -counts;
+    /* One count back on the same edge is vibration or a reversal: the time between them tells no velocity. */
+    const bool dithers = (counts == 1 && enc->edge_counts < 0) || (counts == -1 && enc->edge_counts > 0);
     if (dithers)
         enc->speed = 0.0;
     else if (since_s > 0.0)

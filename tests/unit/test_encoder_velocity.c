@@ -141,6 +141,21 @@ static void vibration_on_one_edge_is_no_velocity(void **state)
     rig_free(card.rig);
 }
 
+static void the_first_count_back_is_no_velocity(void **state)
+{
+    (void)state;
+    struct encoder_card card = open_card();
+    static const int moves[] = {4, 4, -1, -1, 1};
+    static const double velocities[] = {0, 4000, 0, -1000, 0};
+    for (size_t i = 0; i < sizeof moves / sizeof moves[0]; i++) {
+        encoder_card_move(&card, PERIOD_TICKS, moves[i]);
+        encoder_card_cycle(&card);
+        if (i > 0)
+            assert_near(get(&card, "velocity"), velocities[i], 1e-6);
+    }
+    rig_free(card.rig);
+}
+
 static void lost_cycles_do_not_spoil_the_velocity(void **state)
 {
     (void)state;
@@ -239,6 +254,7 @@ int main(void)
         cmocka_unit_test(without_edges_the_velocity_falls_as_one_count_a_time),
         cmocka_unit_test(the_interpolated_position_runs_between_edges),
         cmocka_unit_test(vibration_on_one_edge_is_no_velocity),
+        cmocka_unit_test(the_first_count_back_is_no_velocity),
         cmocka_unit_test(lost_cycles_do_not_spoil_the_velocity),
         cmocka_unit_test(a_slow_thread_with_fine_stamps_is_right),
         cmocka_unit_test(an_edge_just_after_the_stamp_counter_was_read_is_in_order),
