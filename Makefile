@@ -217,6 +217,13 @@ $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPE
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(LIB_A) $(CHECK_LIBS) -lm \
 		-lpthread
 
+# Runs drivers in this process, which find HAL, RTAPI and the C library's sockets here.
+$(BUILDDIR)/system/check_dropin_behaviour: $(BUILDDIR)/obj/tests/system/check_dropin_behaviour.o $(call obj,$(SYSTEM_HELPERS) \
+	$(wildcard tests/system/dropin/*.c)) $(SIM_A) $(HOST_A) $(LIB_A) | $(COMPONENT_SO)
+	@mkdir -p $(@D)
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) -Wl,--whole-archive $(HOST_A) \
+		-Wl,--no-whole-archive $(LIB_A) $(CHECK_LIBS) -rdynamic -lm -lpthread -ldl
+
 $(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(HOST_A) $(LIB_A)
 	@mkdir -p $(@D)
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) -Wl,--whole-archive $(HOST_A) \
@@ -310,5 +317,5 @@ clean: ## remove the build folder
 	rm -rf $(BUILDDIR)
 
 -include $(patsubst %.o,%.d,$(LIB_OBJ) $(SIM_OBJ) $(HOST_OBJ) \
-	$(call obj,$(wildcard tools/*/*.c components/*/*.c tests/*/*.c)) $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc/%.o, \
+	$(call obj,$(wildcard tools/*/*.c components/*/*.c tests/*/*.c tests/system/dropin/*.c)) $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc/%.o, \
 	$(wildcard components/*/*.c)))

@@ -65,7 +65,8 @@ enum {
 
 void sim_lbp16_spend(struct sim_lbp16 *const e, const unsigned clocks)
 {
-    e->now_ns += (int64_t)clocks * CLOCK_NS;
+    if (!e->instant)
+        e->now_ns += (int64_t)clocks * CLOCK_NS;
 }
 
 uint16_t sim_lbp16_stamp(const struct sim_lbp16 *const e)
@@ -518,6 +519,11 @@ void sim_card_set_time(struct sim_card *const card, const int64_t now_ns)
 int64_t sim_card_clock_at(const struct sim_card *const card, const int64_t now_ns)
 {
     return sim_lbp16_clk(card->lbp16, now_ns);
+}
+
+void sim_card_set_instant(struct sim_card *const card, const bool instant)
+{
+    card->lbp16->instant = instant;
 }
 
 void sim_card_mac(const struct sim_card *const card, uint8_t mac[6])

@@ -2,14 +2,14 @@
 /*
  * The reviewed table of differences between LinuxCNC's driver and ours: tests/data/dropin/differences. A difference
  * that no row allows fails a test, and so does a row that allows nothing any more.
- * Rows: WHERE WHAT NAME LIMIT REASON, see the table itself. Failures of the harness end the test through Check.
+ * Rows: WHERE WHAT NAME LIMIT REASON, see the table itself.
  */
 #ifndef TEST_DROPIN_TABLE_H
 #define TEST_DROPIN_TABLE_H
 
 #include <stdbool.h>
 
-/* Read the table, into memory that forked tests share. Call it before the tests run. */
+/* Read the table, into memory that forked tests share. Call it before the tests run; a bad table ends the program. */
 void dropin_table_load(const char *path);
 
 /* Limit of the first row for a difference, which is then in use; NULL when no row allows it. `where` is what the row's

@@ -93,6 +93,9 @@ HM2_API int HM2_MUST_CHECK sim_card_follow(struct sim_card *card, unsigned encod
 HM2_API void sim_card_set_time(struct sim_card *card, int64_t now_ns);
 /* Card time at a time of the outside world. */
 HM2_API int64_t sim_card_clock_at(const struct sim_card *card, int64_t now_ns);
+/* The card's processor takes no time: all registers of a packet are read in one clock, and written one clock after the
+ * other. For comparing clients whose packets are arranged differently. Waits that a packet asks for stay. */
+HM2_API void sim_card_set_instant(struct sim_card *card, bool instant);
 /* One datagram to the card's LBP16 port arrives at now_ns. Returns the length of the reply (0 = none) and when it
  * leaves in *reply_ns (may be NULL). A card that is busy with an earlier packet takes this one afterwards. */
 HM2_API size_t sim_card_packet(struct sim_card *card, int64_t now_ns, const uint8_t *request, size_t request_len,

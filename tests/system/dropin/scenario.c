@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "scenario.h"
+
+#include <check.h>
+#include <math.h>
+
+#include <hm2/idrom.h>
+
+enum { PIN_A = 0x01, PIN_B = 0x02, PIN_INDEX = 0x03 }; /* of encoders (register map 4.1) */
+#define EDGE_NS 5000
+
+static void set_point(const struct driver *const driver, const char *const name, const double value)
+{
+    const struct driver_point *const point = driver_find(driver, name);
+    if (!point)
+        ck_abort_msg("no point %s%s", driver->prefix, name);
+    driver_set(point, value);
+}
+
+/* Place is 0 to 1 in the period; so are the shapes, -1 to 1. */
+static double shape(const struct wave *const wave, const double place)
+{
+    const double triangle = place < 0.25 ? 4 * place : place < 0.75 ? 2 - 4 * place : 4 * place - 4;
+    switch (wave->shape) {
+    case WAVE_SINE:
+        return sin(2 * acos(-1) * place);
+    case WAVE_SQUARE:
+        return place < 0.5 ? 1 : -1;
+    case WAVE_TRAPEZOID:
+        return fmax(-1, fmin(1, 2 * triangle));
+    case WAVE_RAMP:
+        return place;
+    case WAVE_TRIANGLE:
+    default:
+        return triangle;
+    }
+}
+
+static void apply_waves(const struct scenario *const scenario, const struct driver *const driver)
+{
+    for (size_t i = 0; i < scenario->wave_count; i++) {
+        const struct wave *const wave = &scenario->waves[i];
+        if (driver->cycle < wave->from || driver->cycle >= wave->to)
+            continue;
+        const double place = (double)((driver->cycle - wave->from) % wave->period) / wave->period;
+        set_point(driver, wave->point, wave->offset + wave->amplitude * shape(wave, place));
+    }
+}
+
+static void apply_settings(const struct scenario *const scenario, const struct driver *const driver)
+{
+    for (size_t i = 0; i < scenario->setting_count; i++)
+        if (scenario->settings[i].cycle == driver->cycle)
+            set_point(driver, scenario->settings[i].point, scenario->settings[i].value);
+}
+
+/* ---- the world outside --------------------------------------------------------------------------------------------
+ */
+
+static void drive_encoder(const struct driver *const driver, const int64_t clk, const int encoder, const uint8_t pin,
+                          const bool level)
+{
+    ck_assert_int_eq(
+        sim_card_drive_input(driver->card, clk, HM2_GTAG_ENCODER, (unsigned)encoder, pin, level ? SIM_HIGH : SIM_LOW),
+        0);
+}
+
+/* Edges of a disc, after the card's present. The disc's place follows from the cycle: the same in every run. */
+static void turn(const struct driver *const driver, const struct event *const event)
+{
+    const int64_t clk = sim_card_clock(driver->card);
+    const int before = (int)(driver->cycle - event->cycle) * event->b, step = event->b < 0 ? -1 : 1;
+    for (int i = 1; i <= event->b * step; i++) {
+        const unsigned place = (unsigned)(before + i * step) & 3u;
+        const int64_t at = clk + (int64_t)i * EDGE_NS / 10;
+        drive_encoder(driver, at, event->a, PIN_A, place == 1 || place == 2);
+        drive_encoder(driver, at, event->a, PIN_B, place >= 2);
+    }
+}
+
+/* What happens to card and network while an event lasts; true when write() is left out. */
+static bool apply_event(const struct event *const event, struct driver *const driver)
+{
+    const int64_t clk = sim_card_clock(driver->card);
+    switch (event->action) {
+    case FOLLOW:
+        ck_assert_int_eq(sim_card_follow(driver->card, (unsigned)event->a, (unsigned)event->b, event->c, event->d), 0);
+        break;
+    case INDEX:
+        drive_encoder(driver, clk, event->a, PIN_INDEX, event->b);
+        break;
+    case PAD:
+        ck_assert_int_eq(sim_card_drive(driver->card, clk, (unsigned)event->a, (enum sim_level)event->b), 0);
+        break;
+    case TURN:
+        turn(driver, event);
+        break;
+    case LOSE_REQUESTS:
+        driver->lose_requests = true;
+        break;
+    case LOSE_WRITES:
+        driver->lose_writes = true;
+        break;
+    case POWER_CYCLE:
+        sim_card_power_cycle(driver->card);
+        break;
+    case NO_WRITE:
+        return true;
+    }
+    return false;
+}
+
+static bool apply_events(const struct scenario *const scenario, struct driver *const driver)
+{
+    bool no_write = false;
+    driver->lose_requests = driver->lose_writes = false;
+    for (size_t i = 0; i < scenario->event_count; i++) {
+        const struct event *const event = &scenario->events[i];
+        const unsigned to = event->to ? event->to : event->cycle + 1;
+        if (driver->cycle >= event->cycle && driver->cycle < to)
+            no_write |= apply_event(event, driver);
+    }
+    return no_write;
+}
+
+void scenario_cycle(const struct scenario *const scenario, struct driver *const driver)
+{
+    driver_begin_cycle(driver);
+    apply_settings(scenario, driver);
+    const bool no_write = apply_events(scenario, driver);
+    driver_read(driver);
+    apply_waves(scenario, driver);
+    if (!no_write)
+        driver_write(driver);
+    driver->cycle++;
+}

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* What happens in a run, cycle by cycle: to the driver's pins, to the card's pads, to the network. */
+#ifndef TEST_DROPIN_SCENARIO_H
+#define TEST_DROPIN_SCENARIO_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hm2/sim.h>
+
+#include "driver.h"
+
+/* A point gets a value in one cycle, before read(). */
+struct setting {
+    unsigned cycle;
+    const char *point;
+    double value;
+};
+
+/* A point gets a value in every cycle of [from, to), before write(): offset + amplitude * shape(place in the period).
+ */
+struct wave {
+    const char *point;
+    enum { WAVE_SINE, WAVE_TRIANGLE, WAVE_SQUARE, WAVE_TRAPEZOID, WAVE_RAMP } shape;
+    double amplitude, offset;
+    unsigned period, from, to;
+};
+
+enum action {
+    FOLLOW,        /* encoder a turns with step generator b, c counts in d steps */
+    INDEX,         /* index input of encoder a is at level b */
+    PAD,           /* the world outside drives I/O a to level b */
+    TURN,          /* in each cycle of [cycle, to): encoder a makes b edges (its inputs are driven) */
+    LOSE_REQUESTS, /* in [cycle, to) */
+    LOSE_WRITES,   /* in [cycle, to) */
+    NO_WRITE,      /* write() is not called in [cycle, to) */
+    POWER_CYCLE,   /* of the card, in this cycle */
+};
+
+struct event {
+    unsigned cycle, to;
+    enum action action;
+    int a, b, c, d;
+};
+
+/* A value that a point must have reached at least in some cycle, or the script does not test what it says. */
+struct milestone {
+    const char *point;
+    double value;
+};
+
+#define MAX_MILESTONES 4u
+
+struct scenario {
+    const char *name, *card, *config;
+    unsigned cycles;
+    const struct setting *settings;
+    const struct wave *waves;
+    const struct event *events;
+    size_t setting_count, wave_count, event_count;
+    bool paced;                               /* the card's processor takes its time */
+    struct milestone reached[MAX_MILESTONES]; /* ends with a point NULL, or when full */
+};
+
+extern const struct scenario scenarios[];
+extern const size_t scenario_count;
+
+/* One cycle with all that belongs to it: read, then write. */
+void scenario_cycle(const struct scenario *scenario, struct driver *driver);
+
+#endif

@@ -1,0 +1,358 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* The scripts of tests/system/check_dropin_behaviour.c. */
+#include "scenario.h"
+
+#define COUNT(table) (sizeof(table) / sizeof((table)[0]))
+#define SCENARIO(script, on, with, length, ...)                                                                  \
+    {                                                                                                            \
+        .name = #script, .card = on, .config = with, .cycles = length, .settings = script##_settings,            \
+        .setting_count = COUNT(script##_settings), .waves = script##_waves, .wave_count = COUNT(script##_waves), \
+        .events = script##_events, .event_count = COUNT(script##_events), __VA_ARGS__                            \
+    }
+
+#define STEPGEN(n, scale, velocity, acceleration, len, space)                            \
+    {0, "stepgen." n ".position-scale", scale}, {0, "stepgen." n ".maxvel", velocity},   \
+        {0, "stepgen." n ".maxaccel", acceleration}, {0, "stepgen." n ".steplen", len},  \
+        {0, "stepgen." n ".stepspace", space}, {0, "stepgen." n ".dirsetup", 3 * (len)}, \
+    {                                                                                    \
+        0, "stepgen." n ".dirhold", 2 * (len)                                            \
+    }
+
+/* ---- five axes: sines, ramps, reversals, limits, velocity mode, reset, changes of scale and timing on the way */
+
+static const struct setting motion_settings[] = {
+    STEPGEN("00", 1000, 200, 10000, 2000, 2000),
+    STEPGEN("01", -400, 50, 1000, 5000, 5000),
+    STEPGEN("02", 3141.59, 0, 0, 1000, 1000),
+    STEPGEN("03", 80, 12.5, 100, 20000, 10000),
+    STEPGEN("04", 250, 100, 500, 3000, 4000),
+    {0, "watchdog.timeout_ns", 5000000},
+    {10, "stepgen.00.enable", 1},
+    {10, "stepgen.01.enable", 1},
+    {20, "stepgen.02.enable", 1},
+    {20, "stepgen.03.enable", 1},
+    {5, "stepgen.04.control-type", 1},
+    {10, "stepgen.04.enable", 1},
+    {700, "stepgen.01.enable", 0},
+    {800, "stepgen.01.enable", 1},
+    {1200, "stepgen.01.position-scale", 800},
+    {1300, "stepgen.00.steplen", 2500},
+    {1300, "stepgen.00.stepspace", 1234},
+    {1500, "stepgen.02.position-reset", 1},
+    {1505, "stepgen.02.position-reset", 0},
+    {1800, "stepgen.00.step_type", 1},
+    {1850, "stepgen.01.step_type", 2},
+    {1900, "stepgen.00.step_type", 0},
+    /* While this axis rests (see its wave). */
+    {1400, "stepgen.03.dirsetup", 200000}, /* more than the register holds: clamped */
+    {1400, "stepgen.03.maxvel", 1e9},      /* more than the step timing permits: clamped */
+    {1420, "stepgen.03.maxvel", -30},      /* made positive */
+    {1430, "stepgen.03.maxaccel", -400},   /* made positive */
+};
+
+static const struct wave motion_waves[] = {
+    {"stepgen.00.position-cmd", WAVE_SINE, 10, 0, 1000, 0, 2000},
+    {"stepgen.01.position-cmd", WAVE_TRIANGLE, 4, 0, 400, 0, 2000},
+    {"stepgen.02.position-cmd", WAVE_SINE, 2.5, 0, 300, 0, 2000},
+    {"stepgen.03.position-cmd", WAVE_TRAPEZOID, 5, 0, 1200, 0, 601},
+    {"stepgen.03.position-cmd", WAVE_TRAPEZOID, 5, 0, 1200, 1600, 2000},
+    {"stepgen.04.velocity-cmd", WAVE_SQUARE, 40, 5, 500, 0, 2000},
+};
+
+static const struct event motion_events[] = {
+    {1, 0, FOLLOW, 0, 0, 4, 1},
+};
+
+/* ---- an encoder: turning both ways, index, reset, scale, filter, quadrature errors, standstill and creeping */
+
+static const struct setting encoder_settings[] = {
+    {0, "encoder.00.scale", 100},
+    {100, "encoder.00.scale", -250},
+    {300, "encoder.00.index-enable", 1},
+    {500, "encoder.00.index-invert", 1},
+    {520, "encoder.00.index-enable", 1},
+    {700, "encoder.00.reset", 1},
+    {710, "encoder.00.reset", 0},
+    {800, "encoder.00.filter", 0},
+    {820, "encoder.sample-frequency", 10000000},
+    {850, "encoder.00.quad-error-enable", 1},
+    {950, "encoder.00.counter-mode", 1},
+    {1000, "encoder.00.counter-mode", 0},
+    {1000, "encoder.00.filter", 1},
+    {1050, "encoder.hires-timestamp", 1},
+    {1300, "encoder.00.vel-timeout", 0.1},
+    {1400, "encoder.00.index-mask", 1},
+    {1410, "encoder.00.index-mask-invert", 1},
+    {1500, "encoder.sample-frequency", 100000000},
+    {1600, "encoder.hires-timestamp", 0},
+    {1650, "encoder.00.scale", 0}, /* replaced */
+};
+
+static const struct wave encoder_waves[] = {
+    {"led.CR01", WAVE_SQUARE, 0.5, 0.5, 100, 0, 1800},
+};
+
+static const struct event encoder_events[] = {
+    {350, 0, INDEX, 0, 1, 0, 0},     {351, 0, INDEX, 0, 0, 0, 0},    {540, 0, INDEX, 0, 1, 0, 0},
+    {543, 0, INDEX, 0, 0, 0, 0},     {50, 250, TURN, 0, 7, 0, 0},    {250, 450, TURN, 0, 3, 0, 0},
+    {450, 650, TURN, 0, -5, 0, 0},   {650, 780, TURN, 0, 2, 0, 0},   {900, 1000, TURN, 0, 4, 0, 0},
+    {1060, 1200, TURN, 0, -9, 0, 0}, {1350, 1390, TURN, 0, 1, 0, 0}, {1420, 1430, TURN, 0, 1, 0, 0},
+    {1450, 1455, TURN, 0, 1, 0, 0},  {1700, 1750, TURN, 0, 6, 0, 0},
+};
+
+/* ---- outputs and inputs: PWM, SSR, OutM, LEDs, GPIO and filtered inputs */
+
+static const struct setting io_settings[] = {
+    {0, "pwmgen.00.scale", 10},
+    {10, "pwmgen.00.enable", 1},
+    {100, "pwmgen.00.output-type", 2},
+    {150, "pwmgen.00.output-type", 3},
+    {200, "pwmgen.00.output-type", 4},
+    {220, "pwmgen.00.output-type", 7}, /* no such type: replaced */
+    {250, "pwmgen.00.offset-mode", 1},
+    {300, "pwmgen.pwm_frequency", 100000},
+    {320, "pwmgen.pdm_frequency", 6000000},
+    {340, "pwmgen.pwm_frequency", 500000}, /* too fast: clamped */
+    {360, "pwmgen.pwm_frequency", 0},      /* 1 */
+    {380, "pwmgen.00.enable", 0},
+    {400, "pwmgen.00.offset-mode", 0},
+    {410, "pwmgen.00.enable", 1},
+    {420, "pwmgen.pwm_frequency", 20000},
+    {100, "ssr.00.rate", 500000},
+    {150, "ssr.00.rate", 0},
+    {200, "ssr.00.rate", 1},         /* clamped */
+    {250, "ssr.00.rate", 100000000}, /* clamped */
+    {300, "ssr.00.rate", 1000000},
+    {120, "ssr.00.invert-01", 1},
+    {130, "ssr.00.invert-02", 1},
+    {140, "outm.00.invert-04", 1},
+    {50, "gpio.034.is_output", 1},
+    {60, "gpio.035.is_output", 1},
+    {70, "gpio.035.is_opendrain", 1},
+    {80, "gpio.036.is_output", 1},
+    {90, "gpio.036.invert_output", 1},
+    {200, "gpio.034.is_output", 0},
+    {210, "gpio.050.is_output", 1},
+    {220, "stepgen.00.step.invert_output", 1},
+    {230, "stepgen.00.direction.is_opendrain", 1},
+    {100, "inm.00.input-03-slow", 1},
+    {250, "inm.00.fast_scans", 20},
+    {260, "inm.00.slow_scans", 100},
+    {270, "inm.00.fast_scans", 100}, /* clamped */
+    {280, "inm.00.scan_rate", 40000},
+    {290, "inm.00.slow_scans", 5000},    /* clamped */
+    {300, "inm.00.scan_rate", 99999999}, /* clamped */
+    {350, "inm.00.enc0_4xmode", 1},
+    {500, "inm.00.enc0-reset", 1},
+    {510, "inm.00.enc0-reset", 0},
+    {10, "raw.read_address", 0x0100},
+    {20, "raw.read_address", 0x2000},
+    {30, "raw.write_address", 0x2000},
+};
+
+static const struct wave io_waves[] = {
+    {"pwmgen.00.value", WAVE_SINE, 12, 0, 200, 0, 800},    {"ssr.00.out-00", WAVE_SQUARE, 0.5, 0.5, 14, 0, 800},
+    {"ssr.00.out-01", WAVE_SQUARE, 0.5, 0.5, 22, 0, 800},  {"ssr.00.out-03", WAVE_SQUARE, 0.5, 0.5, 6, 0, 800},
+    {"outm.00.out-04", WAVE_SQUARE, 0.5, 0.5, 10, 0, 800}, {"outm.00.out-05", WAVE_SQUARE, 0.5, 0.5, 18, 0, 800},
+    {"gpio.034.out", WAVE_SQUARE, 0.5, 0.5, 12, 0, 800},   {"gpio.035.out", WAVE_SQUARE, 0.5, 0.5, 16, 0, 800},
+    {"gpio.036.out", WAVE_SQUARE, 0.5, 0.5, 20, 0, 800},   {"gpio.050.out", WAVE_SQUARE, 0.5, 0.5, 24, 0, 800},
+    {"led.CR02", WAVE_SQUARE, 0.5, 0.5, 30, 0, 800},       {"led.CR04", WAVE_SQUARE, 0.5, 0.5, 50, 0, 800},
+};
+
+static const struct event io_events[] = {
+    {20, 0, PAD, 0, SIM_LOW, 0, 0},   {40, 0, PAD, 3, SIM_LOW, 0, 0},    {60, 0, PAD, 0, SIM_HIGH, 0, 0},
+    {90, 0, PAD, 3, SIM_HIGH, 0, 0},  {110, 0, PAD, 3, SIM_LOW, 0, 0},   {170, 0, PAD, 3, SIM_HIGH, 0, 0},
+    {200, 0, PAD, 37, SIM_LOW, 0, 0}, {240, 0, PAD, 37, SIM_HIGH, 0, 0}, {400, 0, PAD, 1, SIM_LOW, 0, 0},
+    {420, 0, PAD, 0, SIM_LOW, 0, 0},  {440, 0, PAD, 1, SIM_HIGH, 0, 0},  {460, 0, PAD, 0, SIM_HIGH, 0, 0},
+    {480, 0, PAD, 1, SIM_LOW, 0, 0},  {520, 0, PAD, 10, SIM_LOW, 0, 0},  {540, 0, PAD, 0, SIM_LOW, 0, 0},
+};
+
+/* ---- the watchdog: writes stop, it bites, recovery once and twice; a time that is too short */
+
+static const struct setting bite_settings[] = {
+    STEPGEN("00", 1000, 100, 1000, 2000, 2000),
+    {0, "watchdog.timeout_ns", 5000000},
+    {0, "gpio.034.is_output", 1},
+    {0, "gpio.034.out", 1},
+    {0, "gpio.035.is_output", 1},
+    {0, "gpio.035.is_opendrain", 1},
+    {0, "gpio.036.is_output", 1},
+    {0, "gpio.036.invert_output", 1},
+    {0, "pwmgen.00.enable", 1},
+    {0, "pwmgen.00.value", 0.25},
+    {0, "ssr.00.out-02", 1},
+    {0, "outm.00.out-05", 1},
+    {0, "stepgen.00.enable", 1},
+    {0, "encoder.00.scale", 100},
+    {200, "watchdog.has_bit", 0},
+    {450, "stepgen.00.enable", 0},
+    {460, "watchdog.has_bit", 0},
+    {500, "stepgen.00.enable", 1},
+    {600, "watchdog.timeout_ns", 200000}, /* shorter than a period: bites at once */
+    {650, "watchdog.timeout_ns", 20000000},
+    {660, "watchdog.has_bit", 0},
+    {700, "watchdog.timeout_ns", 4000000000}, /* fits the register */
+};
+
+static const struct wave bite_waves[] = {
+    {"stepgen.00.position-cmd", WAVE_SINE, 5, 0, 400, 0, 900},
+};
+
+static const struct event bite_events[] = {
+    {1, 0, FOLLOW, 0, 0, 4, 1},
+    {100, 120, NO_WRITE, 0, 0, 0, 0},
+    {400, 410, NO_WRITE, 0, 0, 0, 0},
+    {300, 303, NO_WRITE, 0, 0, 0, 0}, /* not long enough to bite */
+};
+
+/* ---- lost packets: single ones both ways, some in a row, until the driver gives up; then set going again */
+
+static const struct setting loss_settings[] = {
+    STEPGEN("00", 1000, 100, 1000, 2000, 2000),
+    STEPGEN("01", 400, 20, 100, 2000, 2000),
+    {0, "watchdog.timeout_ns", 30000000},
+    {0, "stepgen.00.enable", 1},
+    {0, "stepgen.01.control-type", 1},
+    {0, "stepgen.01.velocity-cmd", 10},
+    {0, "stepgen.01.enable", 1},
+    {0, "encoder.00.scale", 4000},
+    {0, "pwmgen.00.enable", 1},
+    {0, "gpio.034.is_output", 1},
+    {700, "packet-error-total", 0},
+    {760, "io_error", 0},
+    {790, "watchdog.has_bit", 0},
+    {900, "packet-error-limit", 4},
+    {900, "packet-error-increment", 3},
+    {960, "io_error", 0},
+};
+
+static const struct wave loss_waves[] = {
+    {"stepgen.00.position-cmd", WAVE_SINE, 5, 0, 400, 0, 1100},
+    {"pwmgen.00.value", WAVE_TRIANGLE, 1, 0, 100, 0, 1100},
+    {"gpio.034.out", WAVE_SQUARE, 0.5, 0.5, 22, 0, 1100},
+};
+
+static const struct event loss_events[] = {
+    {1, 0, FOLLOW, 0, 0, 4, 1},
+    {100, 101, LOSE_REQUESTS, 0, 0, 0, 0},
+    {150, 152, LOSE_REQUESTS, 0, 0, 0, 0},
+    {200, 201, LOSE_WRITES, 0, 0, 0, 0},
+    {250, 253, LOSE_WRITES, 0, 0, 0, 0},
+    {300, 301, LOSE_REQUESTS, 0, 0, 0, 0},
+    {302, 303, LOSE_REQUESTS, 0, 0, 0, 0},
+    {720, 726, LOSE_REQUESTS, 0, 0, 0, 0},
+    {720, 726, LOSE_WRITES, 0, 0, 0, 0},
+    {920, 922, LOSE_REQUESTS, 0, 0, 0, 0},
+};
+
+/* ---- sampling by the DPLL's timers */
+
+static const struct setting dpll_settings[] = {
+    STEPGEN("00", 1000, 100, 1000, 2000, 2000),
+    {0, "stepgen.00.enable", 1},
+    {0, "encoder.00.scale", 4000},
+    {50, "dpll.01.timer-us", -100},
+    {60, "stepgen.timer-number", 1},
+    {100, "encoder.timer-number", 1},
+    {300, "dpll.02.timer-us", 50},
+    {310, "dpll.03.timer-us", -7.5},
+    {320, "dpll.04.timer-us", 0},
+    {400, "stepgen.timer-number", 2},
+    {450, "stepgen.timer-number", 9}, /* no such timer: 0 */
+    {500, "stepgen.timer-number", -1},
+    {510, "encoder.timer-number", 0},
+    {600, "dpll.time-const", 4000},
+    {610, "dpll.plimit", 0x200000},
+    {620, "dpll.base-freq-khz", 2},
+    {650, "dpll.base-freq-khz", 1},
+};
+
+static const struct wave dpll_waves[] = {
+    {"stepgen.00.position-cmd", WAVE_SINE, 3, 0, 400, 0, 800},
+};
+
+static const struct event dpll_events[] = {
+    {1, 0, FOLLOW, 0, 0, 4, 1},
+};
+
+/* ---- a 7I93: four step generators, each with an encoder, and eight PWM generators */
+
+static const struct setting servo_settings[] = {
+    STEPGEN("00", 1000, 100, 2000, 2000, 2000),
+    STEPGEN("01", 500, 100, 2000, 2000, 2000),
+    STEPGEN("02", -2000, 40, 500, 1000, 1000),
+    STEPGEN("03", 100, 50, 200, 3000, 3000),
+    {5, "stepgen.00.enable", 1},
+    {5, "stepgen.01.enable", 1},
+    {5, "stepgen.02.enable", 1},
+    {5, "stepgen.03.enable", 1},
+    {0, "encoder.00.scale", 4000},
+    {0, "encoder.01.scale", -2000},
+    {0, "encoder.02.scale", 500},
+    {0, "encoder.07.scale", 200},
+    {300, "encoder.03.index-enable", 1},
+    {300, "encoder.07.index-enable", 1},
+    {600, "encoder.06.reset", 1},
+    {610, "encoder.06.reset", 0},
+    {0, "pwmgen.00.enable", 1},
+    {0, "pwmgen.03.enable", 1},
+    {0, "pwmgen.03.output-type", 2},
+    {0, "pwmgen.05.enable", 1},
+    {0, "pwmgen.05.output-type", 3},
+    {0, "pwmgen.06.enable", 1},
+    {0, "pwmgen.06.output-type", 4},
+    {0, "pwmgen.07.enable", 1},
+    {0, "pwmgen.07.offset-mode", 1},
+    {0, "pwmgen.07.scale", -10},
+};
+
+static const struct wave servo_waves[] = {
+    {"stepgen.00.position-cmd", WAVE_SINE, 5, 0, 500, 0, 1500},
+    {"stepgen.01.position-cmd", WAVE_TRIANGLE, 5, 1, 700, 0, 1500},
+    {"stepgen.02.position-cmd", WAVE_TRAPEZOID, 1, 0, 900, 0, 1500},
+    {"stepgen.03.position-cmd", WAVE_SINE, 4, -2, 1100, 0, 1500},
+    {"pwmgen.00.value", WAVE_SINE, 1.2, 0, 300, 0, 1500},
+    {"pwmgen.03.value", WAVE_TRIANGLE, 1, 0, 200, 0, 1500},
+    {"pwmgen.05.value", WAVE_SINE, 0.9, 0.1, 170, 0, 1500},
+    {"pwmgen.06.value", WAVE_TRAPEZOID, 1, 0, 230, 0, 1500},
+    {"pwmgen.07.value", WAVE_SINE, 11, 0, 310, 0, 1500},
+};
+
+/* Index pulses come before the edges of their cycle: with them it would be a race which of the two counts first. */
+static const struct event servo_events[] = {
+    {350, 0, INDEX, 3, 1, 0, 0},   {352, 0, INDEX, 3, 0, 0, 0},   {400, 0, INDEX, 7, 1, 0, 0},
+    {401, 0, INDEX, 7, 0, 0, 0},   {1, 0, FOLLOW, 0, 0, 4, 1},    {1, 0, FOLLOW, 1, 1, 4, 1},
+    {1, 0, FOLLOW, 2, 2, 1, 1},    {1, 0, FOLLOW, 4, 3, 10, 1},   {100, 700, TURN, 3, 2, 0, 0},
+    {100, 500, TURN, 7, -3, 0, 0}, {500, 1500, TURN, 6, 1, 0, 0},
+};
+
+/* ---- the first axis once more, slower, with a card whose processor takes its time */
+
+static const struct setting paced_settings[] = {
+    STEPGEN("00", 1000, 100, 1000, 2000, 2000),
+    {0, "stepgen.00.enable", 1},
+    {0, "encoder.00.scale", 4000},
+};
+
+static const struct wave paced_waves[] = {
+    {"stepgen.00.position-cmd", WAVE_SINE, 5, 0, 1500, 0, 2000},
+};
+
+static const struct event paced_events[] = {
+    {1, 0, FOLLOW, 0, 0, 4, 1},
+};
+
+const struct scenario scenarios[] = {
+    SCENARIO(motion, "7i96s", "num_stepgens=5", 2000,
+             .reached = {{"stepgen.04.counts", 1000}, {"encoder.00.count", 20000}}),
+    SCENARIO(encoder, "7i96s", "", 1800, .reached = {{"encoder.00.index-enable", 1}, {"encoder.00.velocity", 100}}),
+    SCENARIO(io, "7i96s", "enable_raw num_stepgens=1", 800,
+             .reached = {{"inm.00.enc0-count", 1}, {"gpio.037.in_not", 1}}),
+    SCENARIO(bite, "7i96s", "", 900, .reached = {{"watchdog.has_bit", 1}}),
+    SCENARIO(loss, "7i96s", "", 1100, .reached = {{"io_error", 1}, {"watchdog.has_bit", 1}, {"packet-error-total", 5}}),
+    SCENARIO(dpll, "7i96s", "", 800, .reached = {{"dpll.ddsize", 1}, {"encoder.00.count", 5000}}),
+    SCENARIO(servo, "7i93", "num_encoders=8 num_pwmgens=8 num_stepgens=4", 1500,
+             .reached = {{"encoder.03.count", 500}, {"encoder.06.count", 500}, {"stepgen.00.counts", 1000}}),
+    SCENARIO(paced, "7i96s", "", 2000, .paced = true, .reached = {{"encoder.00.count", 15000}}),
+};
+const size_t scenario_count = COUNT(scenarios);
