@@ -217,8 +217,9 @@ $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPE
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(LIB_A) $(CHECK_LIBS) -lm \
 		-lpthread
 
-# Runs drivers in this process, which find HAL, RTAPI and the C library's sockets here.
-$(BUILDDIR)/system/check_dropin_behaviour: $(BUILDDIR)/obj/tests/system/check_dropin_behaviour.o $(call obj,$(SYSTEM_HELPERS) \
+# These run drivers in their process, which find HAL, RTAPI and the C library's sockets there.
+$(BUILDDIR)/system/check_dropin_behaviour $(BUILDDIR)/system/check_dropin_loads: \
+$(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPERS) \
 	$(wildcard tests/system/dropin/*.c)) $(SIM_A) $(HOST_A) $(LIB_A) | $(COMPONENT_SO)
 	@mkdir -p $(@D)
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) -Wl,--whole-archive $(HOST_A) \

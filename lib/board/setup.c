@@ -46,8 +46,9 @@ static unsigned available(const struct hm2_idrom *const idrom, const struct coun
     return (a > b ? a : b) * what->per_instance;
 }
 
-/* More than the firmware has is refused, for modules without a driver here too (hal-interface 1.2). LEDs are counted
- * by the card's name, so their own module looks after them. */
+/* More than the firmware has is refused, for modules without a driver here too (hal-interface 1.2). What it lacks
+ * altogether has no effect: LinuxCNC's driver does not even look at such a count, so that there are load lines with it.
+ * LEDs are counted by the card's name, so their own module looks after them. */
 static int check_counts(const struct hm2_board *const board, struct hm2_diag *const diag)
 {
     int err = 0;
@@ -57,7 +58,9 @@ static int check_counts(const struct hm2_board *const board, struct hm2_diag *co
         if (wanted <= 0 || (unsigned)wanted <= there || i == HM2_CFG_LEDS)
             continue;
         const char *const key = hm2_config_key((enum hm2_config_count)i);
-        if (counted[i].clamped)
+        if (there == 0)
+            hm2_diag_warn(diag, "%s: config %s=%d has no effect: the firmware has none", board->prefix, key, wanted);
+        else if (counted[i].clamped)
             hm2_diag_warn(diag, "%s: config %s=%d, but the firmware has %u; using %u", board->prefix, key, wanted,
                           there, there);
         else
@@ -75,7 +78,10 @@ static int check_channels(const struct hm2_board *const board, const char *const
     const unsigned there = instances_of(&board->idrom, gtag);
     int err = 0;
     for (unsigned i = there; i < HM2_CFG_CHANNELS; i++)
-        if (formats[i][0])
+        if (formats[i][0] && there == 0)
+            hm2_diag_warn(diag, "%s: config %s_%u has no effect: the firmware has no such channels", board->prefix, key,
+                          i);
+        else if (formats[i][0])
             err = hm2_diag_add(diag, HM2_ERR_INVALID, "%s: config %s_%u found, but the firmware has %u such channels",
                                board->prefix, key, i, there);
     return err;

@@ -363,7 +363,7 @@ START_TEST(no_row_of_the_table_is_stale)
         printf("SKIP: only %u of %zu scripts were compared\n", *compared, scenario_count);
         return;
     }
-    ck_assert_uint_eq(dropin_table_unused("run/"), 0);
+    ck_assert_uint_eq(dropin_table_unused("run"), 0);
 }
 END_TEST
 

@@ -71,12 +71,19 @@ const char *dropin_table_allows(const char *const where, const char *const what,
     return NULL;
 }
 
+static bool concerns(const struct row *const row, const char *const scope)
+{
+    char first[64];
+    snprintf(first, sizeof first, "%.*s", (int)strcspn(row->where, "/"), row->where);
+    return fnmatch(first, scope, 0) == 0;
+}
+
 unsigned dropin_table_unused(const char *const scope)
 {
     unsigned unused = 0;
     for (unsigned i = 0; i < table->count; i++) {
         const struct row *const row = &table->rows[i];
-        if (row->used > 0 || strncmp(row->where, scope, strlen(scope)) != 0)
+        if (row->used > 0 || !concerns(row, scope))
             continue;
         printf("line %u allows nothing any more: %s %s %s\n", row->line, row->where, row->what, row->name);
         unused++;

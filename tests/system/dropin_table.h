@@ -17,8 +17,8 @@ void dropin_table_load(const char *path);
  * prefix. */
 const char *dropin_table_allows(const char *where, const char *what, const char *name);
 
-/* Print every row whose first column begins with `scope` and that allowed nothing since the table was loaded; returns
- * how many these are. */
+/* Print every row of a scope ("names", "loads", "run"), which is what its first column begins with, and that allowed
+ * nothing since the table was loaded; returns how many these are. */
 unsigned dropin_table_unused(const char *scope);
 
 #endif

@@ -347,16 +347,33 @@ static void modules_are_set_up_and_unknown_ones_left_alone(void **state)
 static void counts_beyond_the_firmware_are_refused_with_key_value_and_limit(void **state)
 {
     struct fixture *const f = *state;
-    assert_int_equal(setup_with(f, "num_encoders=3 num_resolvers=1 num_stepgens=5 num_leds=9 num_dplls=2 "
-                                   "ssi_chan_0=a%4u"),
-                     HM2_ERR_INVALID);
+    assert_int_equal(setup_with(f, "num_encoders=3 num_stepgens=5 num_leds=9 num_dplls=2"), HM2_ERR_INVALID);
     said(f, "config num_encoders=3 found, at most 1 expected: the firmware has no more");
-    said(f, "config num_resolvers=1 found, at most 0 expected");
-    said(f, "config ssi_chan_0 found, but the firmware has 0 such channels");
     said(f, "warning: " PREFIX ": config num_dplls=2, but the firmware has 1; using 1");
     assert_null(strstr(f->diag.text, "num_stepgens"));
     assert_null(strstr(f->diag.text, "num_leds"));
     assert_int_equal(hm2_plain_count(f->plain), 0);
+}
+
+static void a_channel_beyond_those_of_the_firmware_is_refused(void **state)
+{
+    struct fixture *const f = *state;
+    f->card.image.rom[(0x40 + 12 * 4) / 4] = 0x02010008; /* two channels of SSI instead of PWM */
+    assert_int_equal(setup_with(f, "ssi_chan_1=a%4u ssi_chan_2=a%4u"), HM2_ERR_INVALID);
+    said(f, "config ssi_chan_2 found, but the firmware has 2 such channels");
+    assert_null(strstr(f->diag.text, "ssi_chan_1"));
+}
+
+/* As in LinuxCNC, which looks at a count or a channel only when it meets the module. */
+static void what_the_firmware_lacks_altogether_has_no_effect(void **state)
+{
+    struct fixture *const f = *state;
+    assert_int_equal(setup_with(f, "num_resolvers=1 num_3pwmgens=99 ssi_chan_0=a%4u biss_chan_31=b%8u num_uarts=0"), 0);
+    said(f, "warning: " PREFIX ": config num_resolvers=1 has no effect: the firmware has none");
+    said(f, "warning: " PREFIX ": config num_3pwmgens=99 has no effect: the firmware has none");
+    said(f, "warning: " PREFIX ": config ssi_chan_0 has no effect: the firmware has no such channels");
+    said(f, "warning: " PREFIX ": config biss_chan_31 has no effect: the firmware has no such channels");
+    assert_null(strstr(f->diag.text, "num_uarts"));
 }
 
 static void a_smart_serial_port_that_the_firmware_lacks_has_no_effect(void **state)
@@ -1144,6 +1161,8 @@ int main(void)
         TEST(a_card_without_a_name_still_gets_one),
         TEST(modules_are_set_up_and_unknown_ones_left_alone),
         TEST(counts_beyond_the_firmware_are_refused_with_key_value_and_limit),
+        TEST(a_channel_beyond_those_of_the_firmware_is_refused),
+        TEST(what_the_firmware_lacks_altogether_has_no_effect),
         TEST(a_smart_serial_port_that_the_firmware_lacks_has_no_effect),
         TEST(a_bad_config_word_is_refused),
         TEST(descriptors_that_do_not_suit_their_driver_are_all_reported),

@@ -1,0 +1,248 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Load line for load line: what LinuxCNC's driver (hostmot2 and hm2_eth) makes of a config= string, and what our
+ * component makes of it, with the same simulated card and in virtual time (tests/system/dropin). Where the former
+ * loads, the latter must, and with the same objects; where ours refuses, it says in a sentence which word it does not
+ * like. What is different is listed, with its reason, in tests/data/dropin/differences.
+ */
+#include <check.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "dropin/driver.h"
+#include "dropin_table.h"
+
+#define MAX_POINTS 800u
+#define MESSAGES   65536u
+
+/* One word a line, where the reviewed table names it by its number: what follows the card in WHERE. */
+struct line {
+    const char *name, *card, *config;
+};
+
+static const struct line lines[] = {
+/* every count: none, one, all, and more than any firmware has */
+#define COUNTS(key)                                                                               \
+    {key "=0", "7i96s", key "=0"}, {key "=1", "7i96s", key "=1"}, {key "=-1", "7i93", key "=-1"}, \
+    {                                                                                             \
+        key "=99", "7i93", key "=99"                                                              \
+    }
+    COUNTS("num_encoders"),
+    COUNTS("num_resolvers"),
+    COUNTS("num_pwmgens"),
+    COUNTS("num_3pwmgens"),
+    COUNTS("num_rcpwmgens"),
+    COUNTS("num_stepgens"),
+    COUNTS("num_inmuxs"),
+    COUNTS("num_inms"),
+    COUNTS("num_outms"),
+    COUNTS("num_ssrs"),
+    COUNTS("num_oneshots"),
+    COUNTS("num_periodms"),
+    COUNTS("num_xy2mods"),
+    COUNTS("num_bspis"),
+    COUNTS("num_uarts"),
+    COUNTS("num_pktuarts"),
+    COUNTS("num_leds"),
+    COUNTS("num_dplls"),
+    /* how numbers are read */
+    {"hex", "7i93", "num_encoders=0x3"},
+    {"octal", "7i93", "num_encoders=07 num_pwmgens=010"},
+    {"plus", "7i93", "num_encoders=+2"},
+    {"garbage-behind", "7i93", "num_encoders=2x"},
+    {"no-number", "7i93", "num_encoders="},
+    {"word-for-number", "7i93", "num_encoders=two"},
+    {"negative", "7i93", "num_encoders=-2"},
+    {"twice", "7i93", "num_encoders=2 num_encoders=4"},
+    {"blanks", "7i93", "  num_encoders=2   num_stepgens=1  "},
+    {"tab", "7i93", "num_encoders=2\tnum_stepgens=1"},
+    {"upper-case", "7i93", "NUM_ENCODERS=2"},
+    {"unknown", "7i96s", "num_wheels=2"},
+    {"stray", "7i96s", "num_encoders"},
+    /* step generators, raw access, firmware */
+    {"width-0", "7i96s", "stepgen_width=0"},
+    {"width-1", "7i96s", "stepgen_width=1"},
+    {"width-2", "7i96s", "stepgen_width=2"},
+    {"width-8", "7i96s", "stepgen_width=8"},
+    {"width-9", "7i96s", "stepgen_width=9"},
+    {"raw", "7i96s", "enable_raw"},
+    {"raw-value", "7i96s", "enable_raw=1"},
+    {"raw-twice", "7i96s", "enable_raw enable_raw"},
+    {"firmware", "7i96s", "firmware=hm2/7i96s/7i96s_d.bit"},
+    {"firmware-empty", "7i96s", "firmware="},
+    {"adc", "7i96s", "enable_adc"},
+    /* smart serial */
+    {"sserial-all", "7i96s", "sserial_port_0=00000000"},
+    {"sserial-one", "7i96s", "sserial_port_0=0"},
+    {"sserial-mixed", "7i96s", "sserial_port_0=0x2xxxxx"},
+    {"sserial-none", "7i96s", "sserial_port_0=xxxxxxxx"},
+    {"sserial-second", "7i96s", "sserial_port_1=00"},
+    {"sserial-second-none", "7i96s", "sserial_port_1=xxxxxxxx"},
+    {"sserial-last", "7i96s", "sserial_port_3=0"},
+    {"sserial-beyond", "7i96s", "sserial_port_4=0"},
+    {"sserial-many", "7i96s", "sserial_port_0=000000000"},
+    {"sserial-letters", "7i96s", "sserial_port_0=0y"},
+    {"sserial-upper-case", "7i96s", "sserial_port_0=0XXXXXXX"},
+    {"sserial-empty", "7i96s", "sserial_port_0="},
+    {"sserial-no-port", "7i96s", "sserial_port_=0"},
+    {"sserial-7i93", "7i93", "sserial_port_0=00000000"},
+    /* absolute encoders, which no card here has */
+    {"ssi", "7i96s", "ssi_chan_0=pad%1pposition%24g"},
+    {"ssi-typed", "7i96s", "ssi_chan_0=position%24ge"},
+    {"ssi-beyond", "7i96s", "ssi_chan_32=position%24ge"},
+    {"ssi-bad", "7i96s", "ssi_chan_0=%%"},
+    {"ssi-empty", "7i96s", "ssi_chan_0="},
+    {"biss", "7i96s", "biss_chan_1=position%22e"},
+    {"fanuc", "7i96s", "fanuc_chan_0=AA64"},
+    /* nothing */
+    {"empty", "7i96s", ""},
+    {"only-blanks", "7i96s", "   "},
+};
+#define LINES (sizeof lines / sizeof lines[0])
+
+struct record {
+    bool loaded;
+    unsigned count;
+    struct {
+        char name[64];
+        int type;
+    } points[MAX_POINTS];
+    char messages[MESSAGES];
+};
+
+static struct record *theirs, *ours;
+static char where[64];
+static unsigned problems;
+
+static void load(const struct line *const line, const enum driver_kind kind, struct record *const record)
+{
+    struct driver driver = {.kind = kind, .messages = record->messages, .messages_size = MESSAGES};
+    record->loaded = driver_load(&driver, line->card, line->config);
+    ck_assert_uint_lt(driver.point_count, MAX_POINTS);
+    for (size_t i = 0; i < driver.point_count; i++) {
+        snprintf(record->points[i].name, sizeof record->points[i].name, "%s", driver.points[i].name);
+        record->points[i].type = driver.points[i].type;
+    }
+    record->count = (unsigned)driver.point_count;
+}
+
+/* A driver that does not survive a line has not loaded. The child is not told to unload: it ends. */
+static void record(const struct line *const line, const enum driver_kind kind, struct record *const record)
+{
+    int status = 0;
+    memset(record, 0, sizeof *record);
+    const pid_t child = fork();
+    ck_assert_int_ge(child, 0);
+    if (child == 0) {
+        load(line, kind, record);
+        _exit(0);
+    }
+    ck_assert_int_eq(waitpid(child, &status, 0), child);
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+        record->loaded = false;
+        snprintf(record->messages, MESSAGES, "(ended with status 0x%X)", (unsigned)status);
+    }
+}
+
+static void differs(const char *const what, const char *const name, const char *const text)
+{
+    if (dropin_table_allows(where, what, name))
+        return;
+    printf("%s: %s %s%s%s\n", where, what, name, text[0] ? ": " : "", text);
+    problems++;
+}
+
+static const char *find(const struct record *const in, const char *const name, const int type)
+{
+    for (unsigned i = 0; i < in->count; i++)
+        if (strcmp(in->points[i].name, name) == 0)
+            return in->points[i].type == type ? "" : "type";
+    return NULL;
+}
+
+static void compare_points(void)
+{
+    for (unsigned i = 0; i < theirs->count; i++) {
+        const char *const found = find(ours, theirs->points[i].name, theirs->points[i].type);
+        if (!found)
+            differs("missing", theirs->points[i].name, "");
+        else if (found[0])
+            differs("type", theirs->points[i].name, "");
+    }
+    for (unsigned i = 0; i < ours->count; i++)
+        if (!find(theirs, ours->points[i].name, ours->points[i].type))
+            differs("new", ours->points[i].name, "");
+}
+
+/* The word that is refused, by a line of ours that says something. */
+static void check_sentence(const struct line *const line)
+{
+    char word[64];
+    snprintf(word, sizeof word, "%.*s", (int)strcspn(line->config, "= \t"), line->config);
+    for (const char *text = ours->messages; *text; text += strcspn(text, "\n") + 1) {
+        const char *const at = strstr(text, word);
+        const size_t length = strcspn(text, "\n");
+        if (strncmp(text, "hm2_lbp16: ", 11) == 0 && at && at < text + length && length > 60)
+            return;
+        if (text[length] == '\0')
+            break;
+    }
+    printf("%s: refused without a sentence about %s:\n%s\n", where, word, ours->messages);
+    problems++;
+}
+
+START_TEST(a_load_line_does_what_it_does_with_linuxcncs_driver)
+{
+    if (!driver_available(DRIVER_LINUXCNC)) {
+        printf("SKIP: LinuxCNC's hm2_eth is not installed (linuxcnc-uspace)\n");
+        return;
+    }
+    for (size_t i = 0; i < LINES; i++) {
+        const struct line *const line = &lines[i];
+        snprintf(where, sizeof where, "loads/%s/%s", line->card, line->name);
+        record(line, DRIVER_LINUXCNC, theirs);
+        record(line, DRIVER_OURS, ours);
+        if (theirs->loaded && !ours->loaded)
+            differs("refused", "line", ours->messages);
+        if (!theirs->loaded && ours->loaded)
+            differs("accepted", "line", theirs->messages);
+        if (!ours->loaded)
+            check_sentence(line);
+        if (theirs->loaded && ours->loaded)
+            compare_points();
+    }
+    fflush(stdout);
+    ck_assert_uint_eq(problems, 0);
+    ck_assert_uint_eq(dropin_table_unused("loads"), 0);
+}
+END_TEST
+
+static void *shared_memory(const size_t size)
+{
+    void *const memory = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED)
+        exit(1);
+    return memory;
+}
+
+int main(void)
+{
+    dropin_table_load(TEST_DATA "/dropin/differences");
+    theirs = shared_memory(sizeof *theirs);
+    ours = shared_memory(sizeof *ours);
+    Suite *const suite = suite_create("dropin loads");
+    TCase *const tests = tcase_create("loads");
+    tcase_set_timeout(tests, 60);
+    tcase_add_test(tests, a_load_line_does_what_it_does_with_linuxcncs_driver);
+    suite_add_tcase(suite, tests);
+    SRunner *const runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    const int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed > 0;
+}
