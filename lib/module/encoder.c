@@ -165,6 +165,7 @@ static int setup_any(struct hm2_module *const module, struct hm2_setup *const se
     ctx->muxed = muxed;
     ctx->has_probe = md->version & VERSION_PROBE;
     ctx->clock_hz = md->clock_hz;
+    ctx->looks = module->instances > ENCODER_LOOKS ? module->instances : ENCODER_LOOKS;
     int err = claim(module, setup, muxed);
     if (!err)
         err = bind(module, setup);

@@ -7,6 +7,8 @@
 #ifndef HM2_MODULE_ENCODER_H
 #define HM2_MODULE_ENCODER_H
 
+#include <limits.h>
+
 #include <hm2/module.h>
 
 #include "timer.h"
@@ -30,6 +32,9 @@
 #define ENCODER_READBACK \
     (ENCODER_INDEX_HIGH | ENCODER_JUST_ONCE | ENCODER_MASK_HIGH | ENCODER_MASK_USE | ENCODER_UP_DOWN | ENCODER_FILTER)
 
+#define ENCODER_LOOKS       16u      /* cycles of a round of looks, at least */
+#define ENCODER_LOOK_AT_ALL UINT_MAX /* instead of a number */
+
 enum encoder_motion { ENCODER_STOPPED, ENCODER_MOVING };
 
 /* Discarding of quadrature errors from before quad-error-enable: bit 15 is written 1 (clears it in newer firmware),
@@ -51,7 +56,8 @@ struct encoder {
     const struct hm2_module *module;
     unsigned number; /* of this encoder */
 
-    uint16_t counter;      /* as read last */
+    bool still;            /* stopped, nothing armed or reported: while the card says the same nothing changes */
+    uint32_t count_word;   /* count and time stamp as read last */
     int64_t raw;           /* counts since load */
     int64_t zero, latched; /* raw counts at position 0 and at the last event */
     double scale_seen;     /* usable value of the parameter */
@@ -68,6 +74,7 @@ struct encoder {
     uint16_t latch_before; /* latch register before arming */
     bool latch_known;      /* nothing but this search can have changed the latch since */
     bool spent;            /* what is armed in word has fired */
+    bool busy;             /* word or quad are to be looked at in every cycle */
     enum encoder_quad quad;
 };
 
@@ -79,7 +86,9 @@ struct encoder_module {
 
     bool muxed, has_probe;
     bool started;
-    unsigned look; /* encoder whose parameters are looked at next; those of all when it is out of range */
+    /* Encoder whose parameters are looked at next, and whose pins are written although it stands still; and length of
+     * the round. */
+    unsigned look, looks;
     uint32_t clock_hz;
     /* Time stamps. The card's 16-bit counter is extended to 64 bits. */
     bool timebase_known; /* the divisor in use is the one computed with */

@@ -7,7 +7,6 @@
  */
 #include "encoder.h"
 
-#include <limits.h>
 #include <math.h>
 
 #include <hm2/bytes.h>
@@ -149,8 +148,8 @@ static inline void unpack_one(struct encoder *const enc, const struct encoder_mo
 {
     if (!(*enc->scale == enc->scale_seen))
         take_scale(enc);
-    const int32_t counts = hm2_delta16(COUNT_OF(count), enc->counter);
-    enc->counter = COUNT_OF(count);
+    const int32_t counts = hm2_delta16(COUNT_OF(count), COUNT_OF(enc->count_word));
+    enc->count_word = count;
     enc->raw += counts;
     enc->seen = control;
     if (enc->word & ENCODER_LATCHES)
@@ -169,6 +168,15 @@ static inline void unpack_one(struct encoder *const enc, const struct encoder_mo
     estimate_speed(enc, ctx, count, counts);
     *enc->velocity = enc->speed;
     *enc->velocity_rpm = enc->speed * S_PER_MINUTE;
+    enc->still = enc->motion == ENCODER_STOPPED && enc->quad == ENCODER_QUAD_OFF && !(enc->word & ENCODER_LATCHES) &&
+                 !((control ^ enc->word) & ENCODER_READBACK);
+}
+
+/* Nothing that the pins show can have changed. */
+static inline bool is_unchanged(const struct encoder *const enc, const uint32_t count, const uint32_t control)
+{
+    return enc->still && count == enc->count_word && control == enc->seen && !*enc->reset &&
+           *enc->scale == enc->scale_seen;
 }
 
 void encoder_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -180,8 +188,14 @@ void encoder_unpack(struct hm2_module *const module, const struct hm2_cycle *con
     if (!ctx->timebase_known)
         ctx->timebase_known = hm2_section_confirmed(&ctx->divisor);
     const uint8_t *const counts = ctx->counts.bytes, *const controls = ctx->controls.bytes;
-    for (struct encoder *enc = ctx->encoder, *const end = enc + module->instances; enc < end; enc++)
-        unpack_one(enc, ctx, hm2_get_le32(counts + 4u * enc->number), hm2_get_le32(controls + 4u * enc->number));
+    /* Links of the HAL file that loaded us are new before the first write; others may come at any time. */
+    const unsigned look = cycle->writes == 0 ? ENCODER_LOOK_AT_ALL : ctx->look;
+    for (unsigned i = 0; i < module->instances; i++) {
+        struct encoder *const enc = &ctx->encoder[i];
+        const uint32_t count = hm2_get_le32(counts + 4u * i), control = hm2_get_le32(controls + 4u * i);
+        if (i == look || look == ENCODER_LOOK_AT_ALL || !is_unchanged(enc, count, control))
+            unpack_one(enc, ctx, count, control);
+    }
 }
 
 /* At load the raw counts begin with the counter's value and the position with 0; after the card's power came back both
@@ -196,19 +210,20 @@ void encoder_start(struct hm2_module *const module, const struct hm2_cycle *cons
     ctx->stamp_ns = cycle->now_ns;
     for (unsigned i = 0; i < module->instances; i++) {
         struct encoder *const enc = &ctx->encoder[i];
-        enc->counter = COUNT_OF(hm2_window_get(&ctx->counts, i));
+        enc->count_word = hm2_window_get(&ctx->counts, i);
+        enc->still = false;
         enc->seen = hm2_window_get(&ctx->controls, i);
         enc->motion = ENCODER_STOPPED;
         enc->speed = 0.0;
         enc->quad = ENCODER_QUAD_OFF;
         encoder_forget_latch(enc);
         if (!ctx->started) {
-            enc->raw = enc->zero = enc->latched = enc->counter;
+            enc->raw = enc->zero = enc->latched = COUNT_OF(enc->count_word);
             show_positions(enc);
         }
         show_inputs(enc, enc->seen);
         *enc->velocity = *enc->velocity_rpm = 0.0;
     }
-    ctx->look = UINT_MAX;
+    ctx->look = ENCODER_LOOK_AT_ALL;
     ctx->started = true;
 }

@@ -43,7 +43,7 @@ uint32_t encoder_arm(struct encoder *const enc, const uint32_t polarity, const b
 static void latch_fired(struct encoder *const enc, const uint16_t latch)
 {
     /* The latch and the counter are of the same reply: they differ by less than half a turn of 16 bits. */
-    enc->latched = enc->raw + hm2_delta16(latch, enc->counter);
+    enc->latched = enc->raw + hm2_delta16(latch, (uint16_t)enc->count_word);
     enc->spent = true;
     if (enc->word & ENCODER_LATCH_INDEX) {
         if (!*enc->no_clear_on_index)

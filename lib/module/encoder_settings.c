@@ -47,7 +47,7 @@ uint32_t encoder_divisor(const uint32_t clock_hz, const uint32_t tick_hz, double
     return divisor;
 }
 
-static void pack_filter(struct encoder_module *const ctx, const struct hm2_module *const module)
+HM2_RARE static void pack_filter(struct encoder_module *const ctx, const struct hm2_module *const module)
 {
     const uint32_t wanted_hz = *ctx->sample_frequency, wanted_ns = ctx->skew_ns ? *ctx->skew_ns : 0;
     if (wanted_hz == ctx->sample_frequency_seen && wanted_ns == ctx->skew_seen_ns)
@@ -63,17 +63,17 @@ static void pack_filter(struct encoder_module *const ctx, const struct hm2_modul
     hm2_section_set(&ctx->filter_rate, 0, word);
 }
 
-static void pack_divisor(struct encoder_module *const ctx, const unsigned encoders)
+HM2_RARE static void pack_divisor(struct encoder_module *const ctx, const unsigned encoders)
 {
     const bool hires = *ctx->hires_timestamp;
-    if (hires == ctx->hires_seen)
-        return;
     ctx->hires_seen = hires;
     hm2_section_set(&ctx->divisor, 0, encoder_divisor(ctx->clock_hz, hires ? STAMP_HIRES_HZ : STAMP_HZ, &ctx->tick_s));
     /* Stamps of both tick lengths cannot be compared: velocities begin anew when the card counts with the new one. */
     ctx->timebase_known = false;
-    for (unsigned i = 0; i < encoders; i++)
+    for (unsigned i = 0; i < encoders; i++) {
         ctx->encoder[i].motion = ENCODER_STOPPED;
+        ctx->encoder[i].still = false;
+    }
 }
 
 static uint32_t quad_bits(struct encoder *const enc)
@@ -105,9 +105,11 @@ static uint32_t control_word(struct encoder *const enc, const bool has_probe)
     return word;
 }
 
-static void pack_control(struct encoder *const enc, const bool has_probe)
+HM2_RARE static void pack_control(struct encoder *const enc, const bool has_probe)
 {
     const uint32_t word = control_word(enc, has_probe);
+    enc->still = enc->still && word == enc->word && enc->quad == ENCODER_QUAD_OFF;
+    enc->busy = (word & (ENCODER_LATCHES | ENCODER_QUAD_ERROR)) != 0 || enc->quad != ENCODER_QUAD_OFF;
     if (word != enc->word) {
         enc->word = word;
         hm2_section_set(&enc->control, 0, word);
@@ -115,11 +117,18 @@ static void pack_control(struct encoder *const enc, const bool has_probe)
 }
 
 /* Does a pin want something of the control word, or did one? Parameters cannot be linked to signals, only a person sets
- * them: one encoder's are looked at in each cycle. */
-static bool is_busy(const struct encoder *const enc)
+ * them: at most one encoder's are looked at in a cycle. */
+static inline bool is_busy(const struct encoder *const enc, const bool has_probe)
 {
-    return *enc->index_enable || *enc->quad_error_enable || (enc->word & (ENCODER_LATCHES | ENCODER_QUAD_ERROR)) ||
-           enc->quad != ENCODER_QUAD_OFF || (enc->probe_enable && *enc->probe_enable);
+    return enc->busy || *enc->index_enable || *enc->quad_error_enable || (has_probe && *enc->probe_enable);
+}
+
+static inline void pack_all(struct encoder_module *const ctx, const unsigned instances, const bool has_probe)
+{
+    const unsigned look = ctx->look;
+    for (unsigned i = 0; i < instances; i++)
+        if (is_busy(&ctx->encoder[i], has_probe) || i == look || look == ENCODER_LOOK_AT_ALL)
+            pack_control(&ctx->encoder[i], has_probe);
 }
 
 void encoder_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -128,15 +137,16 @@ void encoder_pack(struct hm2_module *const module, const struct hm2_cycle *const
     struct encoder_module *const ctx = module->context;
     if (!ctx)
         return;
-    pack_divisor(ctx, module->instances);
-    pack_filter(ctx, module);
+    if (*ctx->hires_timestamp != ctx->hires_seen)
+        pack_divisor(ctx, module->instances);
+    if (ctx->look == 0 || ctx->look == ENCODER_LOOK_AT_ALL)
+        pack_filter(ctx, module);
     hm2_timer_pack(&ctx->timer, module);
-    const unsigned look = ctx->look;
-    const bool look_at_all = look >= module->instances;
-    ctx->look = look_at_all ? 0 : look + 1 < module->instances ? look + 1 : 0;
-    for (struct encoder *enc = ctx->encoder, *const end = enc + module->instances; enc < end; enc++)
-        if (is_busy(enc) || look_at_all || enc->number == look)
-            pack_control(enc, ctx->has_probe);
+    if (ctx->has_probe)
+        pack_all(ctx, module->instances, true);
+    else
+        pack_all(ctx, module->instances, false);
+    ctx->look = ctx->look + 1 < ctx->looks ? ctx->look + 1 : 0;
 }
 
 static int add_word(struct hm2_setup *const setup, struct hm2_section *const section, const struct hm2_md *const md,
@@ -179,7 +189,6 @@ int encoder_add_settings(struct hm2_module *const module, struct hm2_setup *cons
         err = add_word(setup, &ctx->encoder[i].control, module->md, REG_CONTROL, i);
     if (err)
         return err;
-    ctx->hires_seen = true; /* so that the first call computes the normal divisor */
     pack_divisor(ctx, module->instances);
     pack_filter(ctx, module);
     for (unsigned i = 0; i < module->instances; i++) {

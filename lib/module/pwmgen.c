@@ -28,7 +28,8 @@ struct pwmgen {
     hm2_bit_t *dither; /* version 1, else NULL */
     hm2_s32_t *output_type;
 
-    double scale_seen;
+    double scale_seen, value_seen; /* that the register was computed from; NaN = compute it */
+    bool at_rest;                  /* the register holds the value of a generator that is not enabled */
     int32_t type_seen;
     bool offset_seen, dither_seen;
     struct pwmgen_span span;
@@ -40,6 +41,8 @@ struct pwmgen_module {
     unsigned bits;
     bool has_dither;
     uint32_t enables; /* as handed to the plan last */
+    unsigned look;    /* generator whose parameters are looked at next; those of all with PWMGEN_LOOK_AT_ALL */
+    unsigned looks;   /* length of the round */
     struct hm2_window values;
     struct hm2_section modes, enable, pwm_rate, pdm_rate;
     struct pwmgen generator[]; /* module->instances */
@@ -140,7 +143,7 @@ static uint32_t output_bits(const int32_t type)
     return (uint32_t)bits[type] << MODE_OUTPUT_SHIFT;
 }
 
-static void take_mode(struct pwmgen *const gen, const struct hm2_module *const module, const unsigned number)
+HM2_RARE static void take_mode(struct pwmgen *const gen, const struct hm2_module *const module, const unsigned number)
 {
     struct pwmgen_module *const ctx = module->context;
     int32_t type = *gen->output_type;
@@ -152,6 +155,8 @@ static void take_mode(struct pwmgen *const gen, const struct hm2_module *const m
     gen->offset_seen = *gen->offset_mode;
     gen->dither_seen = gen->dither && *gen->dither;
     const bool pdm = type == PWMGEN_PDM;
+    gen->value_seen = NAN;
+    gen->at_rest = false;
     gen->span = pwmgen_span(pdm ? PWMGEN_BITS_MAX : ctx->bits, gen->dither_seen, gen->offset_seen);
     uint32_t mode = ctx->bits - PWMGEN_BITS_MIN;
     mode |= output_bits(type);
@@ -186,6 +191,29 @@ static void take_frequencies(struct hm2_module *const module)
         take_mode(&ctx->generator[i], module, i);
 }
 
+HM2_RARE static void look_at_all(struct hm2_module *const module, const bool at_generators)
+{
+    struct pwmgen_module *const ctx = module->context;
+    if (*ctx->pwm_frequency != ctx->pwm_seen_hz || *ctx->pdm_frequency != ctx->pdm_seen_hz)
+        take_frequencies(module);
+    for (unsigned i = 0; at_generators && i < module->instances; i++)
+        if (mode_changed(&ctx->generator[i]))
+            take_mode(&ctx->generator[i], module, i);
+}
+
+/* Parameters cannot be linked to signals, only a person sets them: those of at most one generator are looked at in a
+ * cycle. */
+static void look_at_parameters(struct hm2_module *const module)
+{
+    struct pwmgen_module *const ctx = module->context;
+    const unsigned look = ctx->look;
+    ctx->look = look + 1 < ctx->looks ? look + 1 : 0;
+    if (look < module->instances && mode_changed(&ctx->generator[look]))
+        take_mode(&ctx->generator[look], module, look);
+    if (look == 0 || look == PWMGEN_LOOK_AT_ALL)
+        look_at_all(module, look == PWMGEN_LOOK_AT_ALL);
+}
+
 static double duty(struct pwmgen *const gen, const struct hm2_module *const module, const unsigned number)
 {
     if (!(*gen->scale == gen->scale_seen)) {
@@ -197,6 +225,7 @@ static double duty(struct pwmgen *const gen, const struct hm2_module *const modu
         gen->scale_seen = scale;
     }
     const double value = *gen->value;
+    gen->value_seen = isfinite(value) ? value : NAN; /* what is unusable is reported in every cycle */
     /* A true division: the register truncates, and the product with a reciprocal misses full scale by one step. */
     const double wanted = value / gen->scale_seen;
     if (!isfinite(value)) {
@@ -212,17 +241,16 @@ static void pack(struct hm2_module *const module, const struct hm2_cycle *const 
     struct pwmgen_module *const ctx = module->context;
     if (!ctx)
         return;
-    if (*ctx->pwm_frequency != ctx->pwm_seen_hz || *ctx->pdm_frequency != ctx->pdm_seen_hz)
-        take_frequencies(module);
+    look_at_parameters(module);
     uint32_t enables = 0;
     for (unsigned i = 0; i < module->instances; i++) {
         struct pwmgen *const gen = &ctx->generator[i];
-        if (mode_changed(gen))
-            take_mode(gen, module, i);
         const bool enabled = *gen->enable;
-        const double now = enabled ? duty(gen, module, i) : 0.0;
         enables |= (uint32_t)enabled << i;
-        hm2_window_set(&ctx->values, i, pwmgen_value(&gen->span, now));
+        if (enabled ? *gen->value == gen->value_seen && *gen->scale == gen->scale_seen && !gen->at_rest : gen->at_rest)
+            continue;
+        gen->at_rest = !enabled;
+        hm2_window_set(&ctx->values, i, pwmgen_value(&gen->span, enabled ? duty(gen, module, i) : 0.0));
     }
     if (enables != ctx->enables) {
         ctx->enables = enables;
@@ -268,6 +296,8 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup_
     if (!ctx)
         return HM2_ERR_NOMEM;
     module->context = ctx;
+    ctx->look = PWMGEN_LOOK_AT_ALL;
+    ctx->looks = module->instances > PWMGEN_LOOKS ? module->instances : PWMGEN_LOOKS;
     ctx->has_dither = module->md->version == VERSION_DITHER;
     int err = hm2_claim_pins(module, setup_, HM2_GTAG_NONE, module->instances, false, NULL);
     if (!err)

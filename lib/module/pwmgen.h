@@ -3,11 +3,15 @@
 #ifndef HM2_MODULE_PWMGEN_H
 #define HM2_MODULE_PWMGEN_H
 
+#include <limits.h>
 #include <stdbool.h>
 #include <stdint.h>
 
 /* Parameter output-type (hal-interface 2.9). */
 enum pwmgen_type { PWMGEN_PWM_DIR = 1, PWMGEN_UP_DOWN = 2, PWMGEN_PDM = 3, PWMGEN_DIR_PWM = 4 };
+
+#define PWMGEN_LOOKS       16u      /* cycles of a round of looks at parameters, at least */
+#define PWMGEN_LOOK_AT_ALL UINT_MAX /* instead of a generator's number */
 
 #define PWMGEN_BITS_MIN 9u
 #define PWMGEN_BITS_MAX 12u

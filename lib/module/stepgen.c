@@ -4,7 +4,6 @@
  */
 #include "stepgen.h"
 
-#include <limits.h>
 #include <math.h>
 
 #include "bind.h"
@@ -158,6 +157,7 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup_
     ctx->has_swap = ctx->has_latch || md->version == VERSION_SWAP;
     ctx->clock_hz = (double)md->clock_hz;
     ctx->max_step_hz = 0.5 * ctx->clock_hz;
+    ctx->looks = module->instances > STEPGEN_LOOKS ? module->instances : STEPGEN_LOOKS;
 
     int err = hm2_claim_pins(module, setup_, HM2_GTAG_NONE, module->instances, false, within_width);
     if (!err && setup_->has_dpll)
@@ -186,8 +186,28 @@ static void start(struct hm2_module *const module, const struct hm2_cycle *const
     }
     if (ctx->started)
         stepgen_forget_tables(ctx, module->instances);
-    ctx->look = UINT_MAX;
+    ctx->look = STEPGEN_LOOK_AT_ALL;
     ctx->started = true;
+}
+
+static inline void unpack_all(struct stepgen_module *const ctx, const unsigned instances, const bool has_latch)
+{
+    const uint8_t *accumulators = ctx->accumulators.bytes;
+    for (struct stepgen *gen = ctx->generator, *const end = gen + instances; gen < end; gen++, accumulators += 4) {
+        if (!(*gen->position_scale == gen->scale))
+            stepgen_take_limits(gen); /* they are in units of the scale */
+        const uint32_t accumulator = hm2_get_le32(accumulators);
+        const int64_t moved = hm2_delta32(accumulator, gen->accumulator);
+        gen->subcounts = (int64_t)((uint64_t)gen->subcounts + (uint64_t)moved);
+        gen->accumulator = accumulator;
+        if (has_latch)
+            stepgen_unpack_latch(gen, hm2_window_get(&ctx->latches, gen->number));
+        if (*gen->position_reset)
+            gen->subcounts = 0;
+        gen->position = (double)gen->subcounts * (1.0 / SUBCOUNTS_PER_STEP) / gen->scale;
+        *gen->counts = (int32_t)(uint32_t)((uint64_t)gen->subcounts >> 16);
+        *gen->position_fb = gen->position;
+    }
 }
 
 static void unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -196,22 +216,10 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     struct stepgen_module *const ctx = module->context;
     if (!ctx)
         return;
-    const uint8_t *const accumulators = ctx->accumulators.bytes;
-    for (struct stepgen *gen = ctx->generator, *const end = gen + module->instances; gen < end; gen++) {
-        if (!(*gen->position_scale == gen->scale))
-            stepgen_take_limits(gen); /* they are in units of the scale */
-        const uint32_t accumulator = hm2_get_le32(accumulators + 4u * gen->number);
-        const int64_t moved = hm2_delta32(accumulator, gen->accumulator);
-        gen->subcounts = (int64_t)((uint64_t)gen->subcounts + (uint64_t)moved);
-        gen->accumulator = accumulator;
-        if (ctx->has_latch)
-            stepgen_unpack_latch(gen, hm2_window_get(&ctx->latches, gen->number));
-        if (*gen->position_reset)
-            gen->subcounts = 0;
-        gen->position = (double)gen->subcounts * (1.0 / SUBCOUNTS_PER_STEP) / gen->scale;
-        *gen->counts = (int32_t)(uint32_t)((uint64_t)gen->subcounts >> 16);
-        *gen->position_fb = gen->position;
-    }
+    if (ctx->has_latch)
+        unpack_all(ctx, module->instances, true);
+    else
+        unpack_all(ctx, module->instances, false);
 }
 
 static const struct hm2_md_variant variants[] = {

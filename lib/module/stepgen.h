@@ -6,12 +6,17 @@
 #ifndef HM2_MODULE_STEPGEN_H
 #define HM2_MODULE_STEPGEN_H
 
+#include <limits.h>
+
 #include <hm2/module.h>
 
 #include "timer.h"
 
 /* Pulse times, in the order of their registers. */
 enum stepgen_time { STEPGEN_DIRSETUP, STEPGEN_DIRHOLD, STEPGEN_STEPLEN, STEPGEN_STEPSPACE, STEPGEN_TIMES };
+
+#define STEPGEN_LOOKS       16u      /* cycles of a round of looks, at least */
+#define STEPGEN_LOOK_AT_ALL UINT_MAX /* instead of a number */
 
 #define STEPGEN_TABLE_WORDS   4u  /* parameters table-data-0 .. 3, four entries each */
 #define STEPGEN_TABLE_ENTRIES 16u /* depth of the shift register (register map 3.4) */
@@ -54,7 +59,7 @@ struct stepgen {
     uint32_t spent;     /* latches in it that have fired: to be taken out before they may be armed again */
     uint32_t table_seen[STEPGEN_TABLE_WORDS];
     uint32_t type_seen;
-    uint32_t watched;  /* not 0: the mode depends on more than step_type, look at it in every cycle */
+    bool watched;      /* the mode depends on more than step_type: look at it in every cycle */
     bool table_loaded; /* the card was given this generator's table since it was powered */
 };
 
@@ -62,7 +67,8 @@ struct stepgen_module {
     struct hm2_timer timer;
     bool has_swap, has_latch;
     bool started;
-    unsigned look; /* generator whose parameters are looked at next; those of all when it is out of range */
+    unsigned look, looks; /* generator whose parameters are looked at next, and length of the round */
+    unsigned watched;     /* generators that are to be looked at in every cycle */
     double clock_hz;
     double max_step_hz; /* half the clock: what the signed rate register can say */
     int64_t period_seen_ns;

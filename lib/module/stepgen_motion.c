@@ -5,6 +5,7 @@
  */
 #include "stepgen.h"
 
+#include <float.h>
 #include <math.h>
 
 #define SMALLEST_SCALE 1e-6 /* steps per unit; below it hal-interface 2.7 takes 1 */
@@ -72,7 +73,7 @@ static double clamp(const double value, const double low, const double high)
 /* A command pin as a number, or what to use instead of NaN and infinities. */
 static double usable_command(const struct stepgen *const gen, const double command, const double fallback)
 {
-    if (command - command == 0.0)
+    if (fabs(command) <= DBL_MAX)
         return command;
     return report(gen, HM2_NOTICE_VALUE_INVALID, command, fallback);
 }
@@ -148,7 +149,7 @@ static double next_velocity(struct stepgen *const gen, const double period_s, co
 }
 
 /* Is a parameter not as it was seen last? Written so that a NaN counts as changed. Parameters cannot be linked to
- * signals, only a person sets them: those of one generator are looked at in each cycle. */
+ * signals, only a person sets them: those of at most one generator are looked at in a cycle. */
 static bool changed(const struct stepgen *const gen)
 {
     const uint32_t words = (*gen->time_ns[STEPGEN_DIRSETUP] ^ gen->time_seen[STEPGEN_DIRSETUP]) |
@@ -157,6 +158,27 @@ static bool changed(const struct stepgen *const gen)
                            (*gen->time_ns[STEPGEN_STEPSPACE] ^ gen->time_seen[STEPGEN_STEPSPACE]) |
                            (*gen->step_type ^ gen->type_seen);
     return words != 0 || !(*gen->maxvel == gen->maxvel_seen) || !(*gen->maxaccel == gen->maxaccel_seen);
+}
+
+/* Look at all generators: after load and after the card came back, or because the modes of some depend on more than
+ * parameters. */
+HM2_RARE static void look_at_all(struct hm2_module *const module, const bool look_for_changes)
+{
+    struct stepgen_module *const ctx = module->context;
+    for (struct stepgen *gen = ctx->generator, *const end = gen + module->instances; gen < end; gen++)
+        if (gen->watched || (look_for_changes && changed(gen)))
+            stepgen_take_settings(gen);
+}
+
+static void look_at_parameters(struct hm2_module *const module)
+{
+    struct stepgen_module *const ctx = module->context;
+    const unsigned look = ctx->look;
+    if (look < module->instances && changed(&ctx->generator[look]))
+        stepgen_take_settings(&ctx->generator[look]);
+    if (ctx->watched > 0 || look == STEPGEN_LOOK_AT_ALL)
+        look_at_all(module, look == STEPGEN_LOOK_AT_ALL);
+    ctx->look = look + 1 < ctx->looks ? look + 1 : 0;
 }
 
 void stepgen_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -169,18 +191,14 @@ void stepgen_pack(struct hm2_module *const module, const struct hm2_cycle *const
         ctx->inverse_period = 1.0 / cycle->period_s;
     }
     hm2_timer_pack(&ctx->timer, module);
+    look_at_parameters(module);
     /* A bite switches the outputs off but not the generators: without the pulses the position they count would be
      * wrong (hal-interface 6, row 5a). */
     const bool may_move = !cycle->bitten;
     const double period_s = cycle->period_s, per_second = ctx->inverse_period;
-    const unsigned look = ctx->look;
-    const bool look_at_all = look >= module->instances;
-    ctx->look = look + 1 < module->instances ? look + 1 : 0;
-    uint8_t *const rates = ctx->rates.bytes;
-    for (struct stepgen *gen = ctx->generator, *const end = gen + module->instances; gen < end; gen++) {
+    uint8_t *register_ = ctx->rates.bytes;
+    for (struct stepgen *gen = ctx->generator, *const end = gen + module->instances; gen < end; gen++, register_ += 4) {
         int32_t rate = 0;
-        if (gen->watched || ((gen->number == look || look_at_all) && changed(gen)))
-            stepgen_take_settings(gen);
         if (*gen->enable && may_move) {
             gen->velocity = next_velocity(gen, period_s, per_second);
             rate = hm2_trunc_s32(gen->velocity * gen->rate_per_velocity);
@@ -190,6 +208,6 @@ void stepgen_pack(struct hm2_module *const module, const struct hm2_cycle *const
         }
         *gen->velocity_fb = gen->velocity;
         *gen->dbg_step_rate = rate;
-        hm2_put_le32(rates + 4u * gen->number, (uint32_t)rate);
+        hm2_put_le32(register_, (uint32_t)rate);
     }
 }

@@ -167,7 +167,10 @@ void stepgen_take_settings(struct stepgen *const gen)
         word |= MODE_SWAP;
     if (ctx->has_latch)
         word |= latch_bits(gen);
-    gen->watched = ctx->has_swap || (word & MODE_TABLE) == MODE_TABLE;
+    const bool watched = ctx->has_swap || (word & MODE_TABLE) == MODE_TABLE;
+    if (watched != gen->watched)
+        ctx->watched += watched ? 1u : UINT_MAX;
+    gen->watched = watched;
     if (word != gen->mode_word) {
         gen->mode_word = word;
         hm2_section_set(&gen->mode, 0, word);

@@ -105,7 +105,7 @@ static void the_control_word_is_made_of_the_parameters(void **state)
     set(&card, "filter", 0);
     for (size_t i = 0; i < sizeof bits / sizeof bits[0]; i++) {
         set(&card, bits[i].name, 1);
-        cycles(&card, 1);
+        cycles(&card, ENCODER_LOOKS);
         assert_int_equal(rig_written(card.rig, CONTROL), bits[i].bit);
         set(&card, bits[i].name, 0);
     }
@@ -157,10 +157,10 @@ static void sample_frequencies_are_rounded_to_what_is_possible(void **state)
     struct encoder_card card = open_7i96s();
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         rig_set(card.rig, "encoder.sample-frequency", cases[i].wanted_hz);
-        cycles(&card, 1);
+        cycles(&card, ENCODER_LOOKS);
         assert_int_equal(rig_written(card.rig, FILTER), cases[i].rate);
         assert_int_equal(rig_get(card.rig, "encoder.sample-frequency"), cases[i].actual_hz);
-        cycles(&card, 1);
+        cycles(&card, ENCODER_LOOKS);
         assert_int_equal(rig_written(card.rig, FILTER), cases[i].rate);
     }
     assert_int_equal(noticed(&card, HM2_NOTICE_VALUE_CLAMPED), 1);
@@ -251,6 +251,49 @@ static void plain_and_muxed_encoders_together_are_refused_with_a_way_out(void **
 }
 
 /* ---- counts ------------------------------------------------------------------------------------------------------ */
+
+/* A host may link a pin at any time, to a signal that has another value. */
+static void pins_of_an_encoder_that_stands_still_are_written_at_once_at_first_and_then_in_turns(void **state)
+{
+    (void)state;
+    struct encoder_card card = open_7i96s();
+    card.count = 1234;
+    cycles(&card, 3000); /* beyond vel-timeout */
+    assert_int_equal(get(&card, "rawcounts"), 1234);
+    const uint32_t writes = card.rig->cycle.writes;
+    for (unsigned first = 0; first < 2; first++) {
+        card.rig->cycle.writes = first == 0 ? 0 : writes;
+        set(&card, "rawcounts", 0);
+        set(&card, "velocity", 7);
+        cycles(&card, first == 0 ? 1 : ENCODER_LOOKS);
+        assert_int_equal(get(&card, "rawcounts"), 1234);
+        assert_true(get(&card, "velocity") == 0.0);
+    }
+    rig_free(card.rig);
+}
+
+static void pins_act_on_an_encoder_that_stands_still(void **state)
+{
+    (void)state;
+    struct encoder_card card = open_7i96s();
+    card.count = 1234;
+    cycles(&card, 3000);
+    set(&card, "reset", 1);
+    cycles(&card, 1);
+    assert_int_equal(get(&card, "count"), 0);
+    set(&card, "reset", 0);
+    card.count++;
+    cycles(&card, 1);
+    assert_int_equal(get(&card, "count"), 1);
+    cycles(&card, 3000);
+    set(&card, "scale", 4);
+    cycles(&card, 1);
+    assert_true(get(&card, "position") == 0.25);
+    card.control |= 0x7; /* levels alone */
+    cycles(&card, 1);
+    assert_true(get(&card, "input-a") == 1.0 && get(&card, "input-b") == 1.0 && get(&card, "input-index") == 1.0);
+    rig_free(card.rig);
+}
 
 static void counting_starts_at_the_counters_value(void **state)
 {
@@ -718,6 +761,8 @@ int main(void)
         cmocka_unit_test(a_timer_number_without_a_register_does_nothing),
         cmocka_unit_test(probing_for_the_timer_spares_the_counts_of_another_module),
         cmocka_unit_test(plain_and_muxed_encoders_together_are_refused_with_a_way_out),
+        cmocka_unit_test(pins_of_an_encoder_that_stands_still_are_written_at_once_at_first_and_then_in_turns),
+        cmocka_unit_test(pins_act_on_an_encoder_that_stands_still),
         cmocka_unit_test(counting_starts_at_the_counters_value),
         cmocka_unit_test(the_levels_of_the_inputs_show_from_load_on),
         cmocka_unit_test(counts_survive_a_power_cycle),

@@ -81,7 +81,7 @@ static void the_skew_is_rounded_to_clocks_beside_the_rate(void **state)
     struct module_rig *const rig = open_rig(4, "");
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         rig_set(rig, "encoder.muxed-skew", cases[i].wanted_ns);
-        rig_cycle(rig);
+        rig_cycles(rig, ENCODER_LOOKS);
         assert_int_equal(rig_written(rig, FILTER), 10 | cases[i].field << 28);
         assert_int_equal(rig_get(rig, "encoder.muxed-skew"), cases[i].actual_ns);
     }
@@ -112,7 +112,7 @@ static void encoders_do_not_disturb_each_others_latches(void **state)
     rig_cycle(rig);
     rig_set(rig, "encoder.02.index-invert", 1);
     bool written = false;
-    for (unsigned i = 0; i < 4; i++) { /* parameters are looked at in turns */
+    for (unsigned i = 0; i < ENCODER_LOOKS; i++) { /* parameters are looked at in turns */
         rig_cycle(rig);
         written = written || rig_wrote(rig, CONTROL + 8);
         assert_false(rig_wrote(rig, CONTROL + 4)); /* a second write could arm a latch that has just fired */

@@ -126,14 +126,14 @@ static void values_are_truncated_fractions_of_full_scale(void **state)
         rig_set(rig, "pwmgen.00.value", cases[i].value);
         rig_set(rig, "pwmgen.00.scale", cases[i].scale);
         rig_set(rig, "pwmgen.00.offset-mode", cases[i].offset);
-        rig_cycle(rig);
+        rig_cycles(rig, PWMGEN_LOOKS);
         assert_int_equal(rig_written(rig, VALUE), cases[i].word);
     }
     rig_set(rig, "pwmgen.00.enable", 0);
     rig_cycle(rig);
     assert_int_equal(rig_written(rig, VALUE), 0x08000000);
     rig_set(rig, "pwmgen.00.offset-mode", 0);
-    rig_cycle(rig);
+    rig_cycles(rig, PWMGEN_LOOKS);
     assert_int_equal(rig_written(rig, VALUE), 0);
     rig_free(rig);
 }
@@ -148,14 +148,14 @@ static void output_types_become_mode_bits(void **state)
     } cases[] = {{2, 0x33}, {3, 0x1B}, {4, 0x2B}, {1, 0x23}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         rig_set(rig, "pwmgen.05.output-type", cases[i].type);
-        rig_cycle(rig);
+        rig_cycles(rig, PWMGEN_LOOKS);
         assert_int_equal(rig_written(rig, MODE + 20), cases[i].mode);
         assert_int_equal(rig_written(rig, MODE), 0x23);
     }
     static const int wrong[] = {0, 5, -1, INT32_MAX, INT32_MIN};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         rig_set(rig, "pwmgen.05.output-type", wrong[i]);
-        rig_cycle(rig);
+        rig_cycles(rig, PWMGEN_LOOKS);
         assert_int_equal(rig_get(rig, "pwmgen.05.output-type"), 1);
         assert_int_equal(rig_written(rig, MODE + 20), 0x23);
     }
@@ -173,7 +173,7 @@ static void pdm_always_has_twelve_bits(void **state)
     rig_cycle(rig);
     assert_int_equal(rig_written(rig, VALUE), 0x0FFF0000);
     rig_set(rig, "pwmgen.00.output-type", 1);
-    rig_cycle(rig);
+    rig_cycles(rig, PWMGEN_LOOKS);
     assert_int_equal(rig_written(rig, VALUE), 0x01FF0000);
     rig_free(rig);
 }
@@ -235,6 +235,36 @@ static void impossible_numbers_give_no_output(void **state)
     rig_set(rig, "pwmgen.00.scale", -4.9e-324);
     rig_cycle(rig);
     assert_int_equal(rig_written(rig, VALUE), 0x8FFF0000);
+    rig_free(rig);
+}
+
+static void values_change_at_once_and_what_is_unusable_is_told_in_every_cycle(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = open_rig(rig_image_7i96s());
+    rig_set(rig, "pwmgen.00.value", 0.5);
+    rig_cycles(rig, 3);
+    assert_int_equal(rig_written(rig, VALUE), 0);
+    rig_set(rig, "pwmgen.00.enable", 1);
+    rig_cycle(rig);
+    assert_int_equal(rig_written(rig, VALUE), 0x07FF8000);
+    rig_cycles(rig, 3);
+    rig_set(rig, "pwmgen.00.scale", 2);
+    rig_cycle(rig);
+    assert_int_equal(rig_written(rig, VALUE), 0x03FFC000);
+    rig_set(rig, "pwmgen.00.value", 2);
+    rig_cycle(rig);
+    assert_int_equal(rig_written(rig, VALUE), 0x0FFF0000);
+    rig_set(rig, "pwmgen.00.enable", 0);
+    rig_cycle(rig);
+    assert_int_equal(rig_written(rig, VALUE), 0);
+    rig_set(rig, "pwmgen.00.enable", 1);
+    rig_cycle(rig);
+    assert_int_equal(rig_written(rig, VALUE), 0x0FFF0000);
+    rig_set(rig, "pwmgen.00.value", INFINITY);
+    rig_cycles(rig, 3);
+    assert_int_equal(rig_written(rig, VALUE), 0);
+    assert_int_equal(rig->noticed[0][HM2_NOTICE_VALUE_INVALID], 3);
     rig_free(rig);
 }
 
@@ -310,7 +340,7 @@ static void command(struct module_rig *const rig, const struct measured *const m
     rig_set(rig, "pwmgen.pwm_frequency", CLOCK_HIGH_HZ / (double)(1u << m->bits));
     rig_set(rig, "pwmgen.00.scale", full);
     rig_set(rig, "pwmgen.00.value", m->value >> 31 ? -counts : counts);
-    rig_cycle(rig);
+    rig_cycles(rig, PWMGEN_LOOKS);
 }
 
 /* Hand every measurement to check(), which returns true when it could be compared; returns how many were. */
@@ -389,6 +419,7 @@ int main(void)
         cmocka_unit_test(enables_are_one_bit_each),
         cmocka_unit_test(dithering_exists_on_firmware_that_can),
         cmocka_unit_test(impossible_numbers_give_no_output),
+        cmocka_unit_test(values_change_at_once_and_what_is_unusable_is_told_in_every_cycle),
         cmocka_unit_test(outputs_are_named_as_in_aliases),
         cmocka_unit_test(everything_is_sent_again_after_a_loss_of_power),
         cmocka_unit_test(duties_and_periods_are_those_that_the_firmware_makes),

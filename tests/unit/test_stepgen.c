@@ -142,7 +142,7 @@ static void every_generator_has_fourteen_pins_and_twelve_parameters(void **state
     rig_free(bench.rig);
 }
 
-static void a_changed_parameter_is_seen_within_as_many_cycles_as_there_are_generators(void **state)
+static void a_changed_parameter_is_seen_within_a_round_of_looks(void **state)
 {
     (void)state;
     struct bench bench = bench_open(rig_image_7i96s(), "");
@@ -155,7 +155,7 @@ static void a_changed_parameter_is_seen_within_as_many_cycles_as_there_are_gener
         (void)snprintf(name, sizeof name, "stepgen.%02u.steplen", i);
         rig_set(bench.rig, name, 1000);
     }
-    run_many(&bench, GENERATORS);
+    run_many(&bench, STEPGEN_LOOKS);
     for (unsigned i = 0; i < GENERATORS; i++)
         assert_int_equal(rig_written(bench.rig, (uint16_t)(STEPLEN + 4 * i)), 100);
     rig_free(bench.rig);
@@ -685,10 +685,13 @@ static void hostile_pins_never_leave_the_limits(void **state)
         run(&bench);
         const double scale = get(&bench, "position-scale"), velocity = get(&bench, "velocity-fb");
         assert_true(isfinite(velocity) && isfinite(scale) && fabs(scale) >= 1e-6);
-        assert_true(isfinite(get(&bench, "maxvel")) && get(&bench, "maxvel") >= 0.0);
-        assert_true(isfinite(get(&bench, "maxaccel")) && get(&bench, "maxaccel") >= 0.0);
         assert_true(isfinite(get(&bench, "position-fb")));
         assert_true(fabs(velocity * scale) <= CLOCK_HZ / 2 * 1.000001);
+        if (i % 5 != 0)
+            continue;
+        run_many(&bench, STEPGEN_LOOKS);
+        assert_true(isfinite(get(&bench, "maxvel")) && get(&bench, "maxvel") >= 0.0);
+        assert_true(isfinite(get(&bench, "maxaccel")) && get(&bench, "maxaccel") >= 0.0);
     }
     set(&bench, "position-scale", -1e-9);
     run(&bench);
@@ -724,7 +727,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_default_times_are_the_longest_and_the_generators_get_their_clock),
         cmocka_unit_test(every_generator_has_fourteen_pins_and_twelve_parameters),
-        cmocka_unit_test(a_changed_parameter_is_seen_within_as_many_cycles_as_there_are_generators),
+        cmocka_unit_test(a_changed_parameter_is_seen_within_a_round_of_looks),
         cmocka_unit_test(without_generators_in_use_there_is_nothing),
         cmocka_unit_test(pins_up_to_the_width_are_claimed_and_driven_from_the_first_write_on),
         cmocka_unit_test(outputs_are_named_as_in_aliases),
