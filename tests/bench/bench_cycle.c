@@ -9,8 +9,8 @@
  *
  * DRIVER is hm2_lbp16, or hm2_eth (LinuxCNC's, with hostmot2 before it). The component is loaded into the small HAL
  * host in this process; a 1 kHz thread calls PREFIX.read and PREFIX.write with marks of our own around them.
- * Instructions are counted by single-stepping that thread from another process: exact, repeatable, and without the
- * kernel's share. `echo` exchanges packets of the same sizes with `serve`, with nothing but the system calls.
+ * Instructions are counted by single-stepping that thread from another process: exact, and without the kernel's share.
+ * `echo` exchanges packets of the same sizes with `serve`, with nothing but the system calls.
  */
 #include <arpa/inet.h>
 #include <errno.h>
@@ -29,7 +29,9 @@
 #include <unistd.h>
 
 #include "halhost.h"
+#include "session.h"
 #include "state.h"
+#include "table.h"
 
 #define PERIOD_NS  1000000L
 #define WARM_UP    300
@@ -113,16 +115,19 @@ static void load(const char *const name, char **const arguments, const int count
 /* ---- marks: functions of our own around the driver's in the thread ----------------------------------------------- */
 
 struct shared {
-    _Atomic int thread; /* kernel's number of the realtime thread */
-    _Atomic int cycle;  /* complete ones */
+    _Atomic int thread;      /* kernel's number of the realtime thread */
+    _Atomic int cycle;       /* complete ones */
+    _Atomic unsigned errors; /* the driver's packet-error-total */
+    uintptr_t read, write;   /* where the driver's functions begin */
 };
 
 static struct shared *shared;
 static int64_t mark_ns[3];
 static int64_t *read_times, *write_times;
 static int wanted_cycles, seen_cycles;
+static hal_u32_t **errors;
 
-__attribute__((noinline)) static void mark_begin(void *const arg, const long period)
+static void mark_begin(void *const arg, const long period)
 {
     (void)arg;
     (void)period;
@@ -130,14 +135,14 @@ __attribute__((noinline)) static void mark_begin(void *const arg, const long per
     mark_ns[0] = now_ns();
 }
 
-__attribute__((noinline)) static void mark_middle(void *const arg, const long period)
+static void mark_middle(void *const arg, const long period)
 {
     (void)arg;
     (void)period;
     mark_ns[1] = now_ns();
 }
 
-__attribute__((noinline)) static void mark_end(void *const arg, const long period)
+static void mark_end(void *const arg, const long period)
 {
     (void)arg;
     (void)period;
@@ -147,6 +152,7 @@ __attribute__((noinline)) static void mark_end(void *const arg, const long perio
         read_times[at] = mark_ns[1] - mark_ns[0];
         write_times[at] = mark_ns[2] - mark_ns[1];
     }
+    shared->errors = **errors;
     shared->cycle++;
 }
 
@@ -156,8 +162,9 @@ static int marks_main(void *const block)
 {
     (void)block;
     marks_id = hal_init("marks");
-    if (marks_id < 0)
-        return marks_id;
+    errors = marks_id < 0 ? NULL : hal_malloc(sizeof *errors);
+    if (!errors || hal_pin_u32_new("mark.errors", HAL_IN, errors, marks_id) != 0)
+        return -1;
     hal_export_funct("mark.begin", mark_begin, NULL, 1, 0, marks_id);
     hal_export_funct("mark.middle", mark_middle, NULL, 1, 0, marks_id);
     hal_export_funct("mark.end", mark_end, NULL, 1, 0, marks_id);
@@ -182,6 +189,58 @@ static void add(const char *const prefix, const char *const suffix)
     }
 }
 
+static void command(const char *const text)
+{
+    const struct hal_session_options options = {.threads = false};
+    struct hal_session *const session = hal_session_new(&options);
+    struct hm2_diag diag = {0};
+    if (!session || hal_session_run_text(session, "settings", text, strlen(text), &diag) != 0) {
+        fprintf(stderr, "bench_cycle: %s", diag.text);
+        exit(1);
+    }
+    hal_session_free(session);
+}
+
+static void setp(const char *const prefix, const char *const name, const char *const value)
+{
+    char text[128];
+    snprintf(text, sizeof text, "setp %s.%s %s\n", prefix, name, value);
+    command(text);
+}
+
+static void enable_all(const char *const prefix, const char *const module)
+{
+    char name[64], full[128];
+    for (unsigned i = 0; i < 100; i++) {
+        snprintf(name, sizeof name, "%s.%02u.enable", module, i);
+        snprintf(full, sizeof full, "%s.%s", prefix, name);
+        if (!hh_table_find(&hh_host()->pins, full))
+            return;
+        setp(prefix, name, "1");
+    }
+}
+
+/* All that the driver has is in use: axes under position control, PWM on. Replies may take as long as they want, and
+ * nothing bites, because a driver that is stepped through is slow and a busy machine is late. */
+static void put_to_work(const char *const prefix)
+{
+    char text[128];
+    setp(prefix, "packet-read-timeout", "2000000000");
+    setp(prefix, "watchdog.timeout_ns", "4000000000");
+    snprintf(text, sizeof text, "net errors %s.packet-error-total => mark.errors\n", prefix);
+    command(text);
+    enable_all(prefix, "stepgen");
+    enable_all(prefix, "pwmgen");
+}
+
+static uintptr_t code_of(const char *const prefix, const char *const suffix)
+{
+    char name[64];
+    snprintf(name, sizeof name, "%s%s", prefix, suffix);
+    const struct hh_funct *const funct = hh_table_find(&hh_host()->functs, name);
+    return funct ? (uintptr_t)funct->code : 0;
+}
+
 static void start_driver(const char *const name, const char *const prefix, const char *const folder,
                          char **const arguments, const int count)
 {
@@ -202,6 +261,9 @@ static void start_driver(const char *const name, const char *const prefix, const
     if (strcmp(name, "hm2_eth") == 0)
         load("hostmot2", NULL, 0);
     load(name, arguments, count);
+    put_to_work(prefix);
+    shared->read = code_of(prefix, ".read");
+    shared->write = code_of(prefix, ".write");
     add("mark", ".begin");
     add(prefix, ".read");
     add("mark", ".middle");
@@ -235,6 +297,10 @@ static int measure_time(const int cycles, char **const argv, const int count)
     start_driver(argv[0], argv[1], argv[3], argv + 4, count - 4);
     wait_for_cycles(cycles + WARM_UP);
     stop_driver();
+    if (shared->errors > 0) {
+        fprintf(stderr, "bench_cycle: %u packet errors, so this is no measurement\n", shared->errors);
+        return 1;
+    }
     print_cycle_times(read_times, write_times, cycles);
     return 0;
 }
@@ -246,35 +312,35 @@ struct counts {
     int cycles;
 };
 
-/* Step the stopped thread through whole cycles; where it is tells what the instruction belongs to. */
+/* Step the stopped thread through whole cycles. What is executed from the first instruction of a function of the
+ * driver's until its return is the driver's; system calls are one instruction. */
 static int step_cycles(const pid_t thread, const int cycles, struct counts *const counts)
 {
-    const unsigned long begin = (unsigned long)mark_begin, middle = (unsigned long)mark_middle,
-                        end = (unsigned long)mark_end;
-    enum { OUTSIDE, IN_BEGIN, IN_READ, IN_MIDDLE, IN_WRITE } where = OUTSIDE;
     struct user_regs_struct regs;
-    unsigned long mark_stack = 0;
-    int status;
+    long long *inside = NULL;
+    unsigned long stack = 0;
+    int status, signal = 0;
 
     while (counts->cycles < cycles) {
-        if (ptrace(PTRACE_SINGLESTEP, thread, NULL, NULL) != 0 || waitpid(thread, &status, __WALL) != thread)
+        if (ptrace(PTRACE_SINGLESTEP, thread, NULL, signal) != 0 || waitpid(thread, &status, __WALL) != thread)
             return -1;
-        if (!WIFSTOPPED(status) || ptrace(PTRACE_GETREGS, thread, NULL, &regs) != 0)
+        if (!WIFSTOPPED(status)) {
+            fprintf(stderr, "bench_cycle: the driver ended with status 0x%X after %d cycles\n", (unsigned)status,
+                    counts->cycles);
             return -1;
-        if (regs.rip == begin || regs.rip == middle) {
-            where = regs.rip == begin ? IN_BEGIN : IN_MIDDLE;
-            mark_stack = regs.rsp;
-        } else if (regs.rip == end) {
-            counts->cycles += where == IN_WRITE;
-            where = OUTSIDE;
-        } else if ((where == IN_BEGIN || where == IN_MIDDLE) && regs.rsp > mark_stack) {
-            /* The mark has returned; the host's few instructions up to the next call are counted with the function. */
-            where = where == IN_BEGIN ? IN_READ : IN_WRITE;
-        } else if (where == IN_READ) {
-            counts->read++;
-        } else if (where == IN_WRITE) {
-            counts->write++;
         }
+        signal = WSTOPSIG(status) == SIGTRAP ? 0 : WSTOPSIG(status);
+        if (ptrace(PTRACE_GETREGS, thread, NULL, &regs) != 0)
+            return -1;
+        if (inside && regs.rsp > stack) {
+            counts->cycles += inside == &counts->write;
+            inside = NULL;
+        } else if (!inside && (regs.rip == shared->read || regs.rip == shared->write)) {
+            inside = regs.rip == shared->read ? &counts->read : &counts->write;
+            stack = regs.rsp;
+        }
+        if (inside)
+            ++*inside;
     }
     return 0;
 }
@@ -303,7 +369,9 @@ static int measure_instructions(const int cycles, char **const argv, const int c
     if (failed)
         perror("bench_cycle: single-stepping");
     kill(child, SIGKILL);
-    if (failed)
+    if (shared->errors > 0)
+        fprintf(stderr, "bench_cycle: %u packet errors, so this is no measurement\n", shared->errors);
+    if (failed || shared->errors > 0)
         return 1;
     printf("read_instructions=%lld\nwrite_instructions=%lld\ncycle_instructions=%lld\n", counts.read / cycles,
            counts.write / cycles, (counts.read + counts.write) / cycles);
