@@ -369,8 +369,45 @@ static int check_lists(const unsigned given)
     return 0;
 }
 
+static bool is_one_of(const char *const text, const char *const *const words)
+{
+    for (const char *const *word = words; *word; word++)
+        if (strcmp(text, *word) == 0)
+            return true;
+    return false;
+}
+
+/* With the level of errors: LinuxCNC shows no others unless told to. */
+static void tell_no_effect(const char *const parameter, const char *const value, const char *const why)
+{
+    rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: warning: %s=%s has no effect: %s\n", parameter, value, why);
+}
+
+static void tell_no_remotes(const char *const parameter, const int value, const int silent)
+{
+    char text[16];
+    rtapi_snprintf(text, sizeof text, "%d", value);
+    if (value != silent)
+        tell_no_effect(parameter, text, "no smart-serial remotes are driven");
+}
+
+/* Parameters of LinuxCNC's drivers that ask for what this component does not do. */
+static void tell_what_has_no_effect(void)
+{
+    static const char *const ordinary[] = {"", "posix", NULL};
+    static const char *const automatic[] = {"", "auto", "none", NULL};
+    for (unsigned i = 0; i < MAX_CARDS; i++)
+        if (board_rtnet[i] && !is_one_of(board_rtnet[i], ordinary))
+            tell_no_effect("board_rtnet", board_rtnet[i], "the sockets are those of the kernel (posix)");
+    if (firewall && !is_one_of(firewall, automatic))
+        tell_no_effect("firewall", firewall, "keep other programs off the card's network by rules of your own");
+    tell_no_remotes("use_serial_numbers", use_serial_numbers, 0);
+    tell_no_remotes("sserial_baudrate", sserial_baudrate, -1);
+}
+
 static int load_cards(void)
 {
+    tell_what_has_no_effect();
     if (!board_ip[0] || !board_ip[0][0]) {
         rtapi_print_msg(RTAPI_MSG_ERR,
                         "hm2_lbp16: no card given; load with: loadrt hm2_lbp16 board_ip=192.168.1.121\n");

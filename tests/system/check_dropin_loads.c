@@ -16,6 +16,7 @@
 
 #include "dropin/driver.h"
 #include "dropin_table.h"
+#include "process.h"
 
 #define MAX_POINTS 800u
 #define MESSAGES   65536u
@@ -119,9 +120,11 @@ static struct record *theirs, *ours;
 static char where[64];
 static unsigned problems;
 
-static void load(const struct line *const line, const enum driver_kind kind, struct record *const record)
+static void load(const struct line *const line, const enum driver_kind kind, const char *const parameter,
+                 struct record *const record)
 {
-    struct driver driver = {.kind = kind, .messages = record->messages, .messages_size = MESSAGES};
+    struct driver driver = {
+        .kind = kind, .parameter = parameter, .messages = record->messages, .messages_size = MESSAGES};
     record->loaded = driver_load(&driver, line->card, line->config);
     ck_assert_uint_lt(driver.point_count, MAX_POINTS);
     for (size_t i = 0; i < driver.point_count; i++) {
@@ -132,14 +135,15 @@ static void load(const struct line *const line, const enum driver_kind kind, str
 }
 
 /* A driver that does not survive a line has not loaded. The child is not told to unload: it ends. */
-static void record(const struct line *const line, const enum driver_kind kind, struct record *const record)
+static void record(const struct line *const line, const enum driver_kind kind, const char *const parameter,
+                   struct record *const record)
 {
     int status = 0;
     memset(record, 0, sizeof *record);
     const pid_t child = fork();
     ck_assert_int_ge(child, 0);
     if (child == 0) {
-        load(line, kind, record);
+        load(line, kind, parameter, record);
         _exit(0);
     }
     ck_assert_int_eq(waitpid(child, &status, 0), child);
@@ -205,8 +209,8 @@ START_TEST(a_load_line_does_what_it_does_with_linuxcncs_driver)
     for (size_t i = 0; i < LINES; i++) {
         const struct line *const line = &lines[i];
         snprintf(where, sizeof where, "loads/%s/%s", line->card, line->name);
-        record(line, DRIVER_LINUXCNC, theirs);
-        record(line, DRIVER_OURS, ours);
+        record(line, DRIVER_LINUXCNC, NULL, theirs);
+        record(line, DRIVER_OURS, NULL, ours);
         if (theirs->loaded && !ours->loaded)
             differs("refused", "line", ours->messages);
         if (!theirs->loaded && ours->loaded)
@@ -219,6 +223,88 @@ START_TEST(a_load_line_does_what_it_does_with_linuxcncs_driver)
     fflush(stdout);
     ck_assert_uint_eq(problems, 0);
     ck_assert_uint_eq(dropin_table_unused("loads"), 0);
+}
+END_TEST
+
+/* ---- module parameters --------------------------------------------------------------------------------------------
+ */
+
+/* What of a component's parameters its file tells: "rtapi_info_type_debug" and so on (hal-interface 5.5). */
+static void list_symbols(struct process *const nm, const char *const file)
+{
+    const char *const argv[] = {"nm", "-D", "--defined-only", file, NULL};
+    ck_assert_int_eq(process_run(nm, argv, 5000), 0);
+}
+
+static bool has_symbol(const struct process *const nm, const char *const symbol)
+{
+    const size_t length = strlen(symbol);
+    for (const char *at = nm->text; (at = strstr(at, symbol)); at += length)
+        if (at[-1] == ' ' && at[length] == '\n')
+            return true;
+    return false;
+}
+
+/* A parameter and the size of an array have symbols of their own. */
+START_TEST(every_module_parameter_of_linuxcncs_driver_is_one_of_ours)
+{
+    static struct process nm[2];
+    unsigned count = 0;
+    if (!driver_available(DRIVER_LINUXCNC)) {
+        printf("SKIP: LinuxCNC's hm2_eth is not installed (linuxcnc-uspace)\n");
+        return;
+    }
+    list_symbols(&nm[0], driver_files(DRIVER_OURS)[0]);
+    for (const char *const *file = driver_files(DRIVER_LINUXCNC); *file; file++) {
+        list_symbols(&nm[1], *file);
+        for (const char *at = nm[1].text; (at = strstr(at, " rtapi_info_"));) {
+            char symbol[64];
+            at++;
+            snprintf(symbol, sizeof symbol, "%.*s", (int)strcspn(at, "\n"), at);
+            if (strncmp(symbol, "rtapi_info_type_", 16) != 0 && strncmp(symbol, "rtapi_info_size_", 16) != 0)
+                continue;
+            ck_assert_msg(has_symbol(&nm[0], symbol), "no %s", symbol);
+            count++;
+        }
+    }
+    ck_assert_uint_gt(count, 9); /* six of hostmot2, three of hm2_eth, two of them arrays */
+}
+END_TEST
+
+static const struct {
+    const char *parameter, *sentence; /* NULL: nothing is said about it */
+} parameters[] = {
+    {"debug=1", "payload of a cycle: request "},
+    {"debug_idrom=1", "payload of a cycle: request "},
+    {"debug_module_descriptors=1", "payload of a cycle: request "},
+    {"debug_pin_descriptors=1", "IO Pin 017 (TB1-2/3): StepGen #0, pin Step"},
+    {"debug_modules=1", "payload of a cycle: request "},
+    {"debug=0", NULL},
+    {"board_rtnet=posix", NULL},
+    {"board_rtnet=evl", "warning: board_rtnet=evl has no effect: "},
+    {"firewall=auto", NULL},
+    {"firewall=none", NULL},
+    {"firewall=nft", "warning: firewall=nft has no effect: "},
+    {"firewall=iptables", "warning: firewall=iptables has no effect: "},
+    {"use_serial_numbers=0", NULL},
+    {"use_serial_numbers=1", "warning: use_serial_numbers=1 has no effect: "},
+    {"sserial_baudrate=-1", NULL},
+    {"sserial_baudrate=115200", "warning: sserial_baudrate=115200 has no effect: "},
+};
+#define PARAMETERS (sizeof parameters / sizeof parameters[0])
+
+START_TEST(a_module_parameter_is_used_or_told_to_have_no_effect)
+{
+    static const struct line line = {"", "7i96s", ""};
+    const char *const parameter = parameters[_i].parameter, *const sentence = parameters[_i].sentence;
+    char name[32];
+    snprintf(name, sizeof name, "%.*s", (int)strcspn(parameter, "="), parameter);
+    record(&line, DRIVER_OURS, parameter, ours);
+    ck_assert_msg(ours->loaded, "%s: %s", parameter, ours->messages);
+    if (sentence)
+        ck_assert_msg(strstr(ours->messages, sentence), "%s: %s", parameter, ours->messages);
+    else
+        ck_assert_msg(!strstr(ours->messages, name), "%s: %s", parameter, ours->messages);
 }
 END_TEST
 
@@ -239,6 +325,8 @@ int main(void)
     TCase *const tests = tcase_create("loads");
     tcase_set_timeout(tests, 60);
     tcase_add_test(tests, a_load_line_does_what_it_does_with_linuxcncs_driver);
+    tcase_add_test(tests, every_module_parameter_of_linuxcncs_driver_is_one_of_ours);
+    tcase_add_loop_test(tests, a_module_parameter_is_used_or_told_to_have_no_effect, 0, (int)PARAMETERS);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);
     srunner_run_all(runner, CK_ENV);

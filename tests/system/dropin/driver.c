@@ -25,11 +25,20 @@ static const struct {
     [DRIVER_OURS] = {"hm2_lbp16", NULL, TEST_BUILD "/components"},
 };
 
+const char *const *driver_files(const enum driver_kind kind)
+{
+    static char paths[2][256];
+    static const char *files[3];
+    snprintf(paths[0], sizeof paths[0], "%s/%s.so", kinds[kind].folder, kinds[kind].module);
+    snprintf(paths[1], sizeof paths[1], "%s/%s.so", kinds[kind].folder, kinds[kind].before ? kinds[kind].before : "");
+    files[0] = paths[0];
+    files[1] = kinds[kind].before ? paths[1] : NULL;
+    return files;
+}
+
 bool driver_available(const enum driver_kind kind)
 {
-    char path[256];
-    snprintf(path, sizeof path, "%s/%s.so", kinds[kind].folder, kinds[kind].module);
-    return access(path, R_OK) == 0;
+    return access(driver_files(kind)[0], R_OK) == 0;
 }
 
 /* ---- what it says and sends ---------------------------------------------------------------------------------------
@@ -176,14 +185,14 @@ static bool load(struct driver *const driver, const char *const module, const ch
 bool driver_load(struct driver *const driver, const char *const card, const char *const config)
 {
     char line[512];
-    const char *const arguments[] = {"board_ip=192.168.1.121", line};
+    const char *const arguments[] = {"board_ip=192.168.1.121", line, driver->parameter};
     snprintf(line, sizeof line, "config=%s", config);
     snprintf(driver->prefix, sizeof driver->prefix, "hm2_%s.0.", card);
     open_host(driver);
     open_card(driver, card);
     if (kinds[driver->kind].before && !load(driver, kinds[driver->kind].before, NULL, 0))
         return false;
-    if (!load(driver, kinds[driver->kind].module, arguments, 2))
+    if (!load(driver, kinds[driver->kind].module, arguments, driver->parameter ? 3 : 2))
         return false;
     collect_points(driver);
     driver->start_ns = (sockets_now_ns() / DRIVER_PERIOD_NS + 10) * DRIVER_PERIOD_NS;

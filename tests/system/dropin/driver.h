@@ -26,8 +26,9 @@ struct driver_point {
 
 struct driver {
     enum driver_kind kind;
-    char prefix[32]; /* "hm2_7i96s.0." */
-    bool paced;      /* its processor takes its time, so that what is read depends on the place in the packet */
+    const char *parameter; /* of the module, besides board_ip and config: "debug=1"; or NULL */
+    char prefix[32];       /* "hm2_7i96s.0." */
+    bool paced;            /* its processor takes its time, so that what is read depends on the place in the packet */
     struct sim_card *card;
     struct sim_net *net;
     int64_t start_ns; /* of cycle 0 */
@@ -45,7 +46,10 @@ struct driver {
 
 /* Whether LinuxCNC's driver is installed. */
 bool driver_available(enum driver_kind kind);
-/* Load. kind, paced, messages and on_write are set by the caller. False when the load failed: the messages say why.
+/* The files of a driver, NULL-terminated: full paths, in static storage. */
+const char *const *driver_files(enum driver_kind kind);
+/* Load. kind, parameter, paced, messages and on_write are set by the caller. False when the load failed: the messages
+ * say why.
  */
 bool driver_load(struct driver *driver, const char *card, const char *config);
 void driver_unload(struct driver *driver);
