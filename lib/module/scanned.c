@@ -102,9 +102,10 @@ static uint32_t control_word(const struct hm2_module *const module, const unsign
 {
     const struct scanned *const ctx = module->context;
     struct instance *const instance = &ctx->instance[unit];
-    /* The lowest rate that the divisor can make, rounded up. */
+    /* The lowest rate that the divisor can make, rounded down as LinuxCNC's driver does. */
     const uint32_t clocks_per_scan = CLOCKS_PER_STEP * instance->width; /* 4..128 */
-    const uint32_t slowest = ctx->clock_hz / (clocks_per_scan * (DIVISOR_MAX + 1u)) + 1u;
+    const uint32_t whole_hz = ctx->clock_hz / (clocks_per_scan * (DIVISOR_MAX + 1u));
+    const uint32_t slowest = whole_hz > 0 ? whole_hz : 1u;
     instance->for_rate = limit(module, instance->scan_rate, slowest, ctx->max_bits_per_s / instance->width, unit);
     instance->for_fast = limit(module, instance->fast_scans, 1, FAST_MAX, unit);
     instance->for_slow = limit(module, instance->slow_scans, 1, SLOW_MAX, unit);

@@ -82,14 +82,11 @@ static void parameters_are_brought_into_their_limits_and_rewritten(void **state)
         double wanted, shown;
     } rows[] = {
         {"inm.00.scan_rate", 1e6, 909090}, /* 10 MHz / 11 */
-        {"inm.00.scan_rate", 0, 2220},     /* 100 MHz / (4 * 11 * 1024), rounded up */
-        {"inm.00.scan_rate", 2219, 2220},
-        {"inm.00.scan_rate", 2220, 2220},
-        {"inm.00.fast_scans", 0, 1},
-        {"inm.00.fast_scans", 64, 63},
-        {"inm.00.slow_scans", 0, 1},
-        {"inm.00.slow_scans", 1024, 1023},
-        {"inm.00.slow_scans", 4294967295.0, 1023},
+        {"inm.00.scan_rate", 0, 2219},     /* 100 MHz / (4 * 11 * 1024), rounded down */
+        {"inm.00.scan_rate", 2218, 2219},  {"inm.00.scan_rate", 2219, 2219},
+        {"inm.00.scan_rate", 2220, 2220},  {"inm.00.fast_scans", 0, 1},
+        {"inm.00.fast_scans", 64, 63},     {"inm.00.slow_scans", 0, 1},
+        {"inm.00.slow_scans", 1024, 1023}, {"inm.00.slow_scans", 4294967295.0, 1023},
     };
     struct hm2_module *inm;
     struct module_rig *const rig = started(10, &inm);
@@ -114,7 +111,7 @@ static void a_slow_rate_set_before_the_first_write_does_not_spill_into_the_filte
     struct module_rig *const rig = started(10, NULL);
     rig_set(rig, "inm.00.scan_rate", 1);
     rig_cycle(rig);
-    assert_int_equal(rig_written(rig, CONTROL(0)), 500u << 22 | 5u << 16 | 1022u << 6 | 0x20);
+    assert_int_equal(rig_written(rig, CONTROL(0)), 500u << 22 | 5u << 16 | 1023u << 6 | 0x20);
     rig_free(rig);
 }
 

@@ -88,11 +88,11 @@ static bool is_of_card(const struct driver *const driver, const char *const name
 }
 
 static void add_point(struct driver *const driver, const struct hh_named *const names, const hal_type_t type,
-                      const volatile void *const value)
+                      const bool settable, const volatile void *const value)
 {
     if (is_of_card(driver, names->name))
-        driver->points[driver->point_count++] = (struct driver_point){hh_shown_name(names) + strlen(driver->prefix),
-                                                                      (int)type, (volatile void *)(uintptr_t)value};
+        driver->points[driver->point_count++] = (struct driver_point){
+            hh_shown_name(names) + strlen(driver->prefix), (int)type, settable, (volatile void *)(uintptr_t)value};
 }
 
 static void collect_points(struct driver *const driver)
@@ -103,11 +103,11 @@ static void collect_points(struct driver *const driver)
     ck_assert_ptr_nonnull(driver->points);
     for (size_t i = 0; i < pins->count; i++) {
         const struct hh_pin *const pin = pins->items[i];
-        add_point(driver, &pin->names, pin->type, hh_pin_value(pin));
+        add_point(driver, &pin->names, pin->type, pin->dir == HAL_IN, hh_pin_value(pin));
     }
     for (size_t i = 0; i < params->count; i++) {
         const struct hh_param *const param = params->items[i];
-        add_point(driver, &param->names, param->type, param->value);
+        add_point(driver, &param->names, param->type, param->dir == HAL_RW, param->value);
     }
 }
 

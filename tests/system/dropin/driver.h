@@ -21,6 +21,7 @@ enum driver_kind { DRIVER_LINUXCNC, DRIVER_OURS };
 struct driver_point {
     const char *name; /* behind the card's prefix */
     int type;         /* hal_type_t */
+    bool settable;    /* an input pin, or a parameter that may be written */
     volatile void *value;
 };
 

@@ -2,9 +2,14 @@
 #include "scenario.h"
 
 #include <check.h>
+#include <fnmatch.h>
 #include <math.h>
 
 #include <hm2/idrom.h>
+
+#include "state.h"
+
+#define COUNT(table) (sizeof(table) / sizeof((table)[0]))
 
 enum { PIN_A = 0x01, PIN_B = 0x02, PIN_INDEX = 0x03 }; /* of encoders (register map 4.1) */
 #define EDGE_NS 5000
@@ -52,6 +57,65 @@ static void apply_settings(const struct scenario *const scenario, const struct d
     for (size_t i = 0; i < scenario->setting_count; i++)
         if (scenario->settings[i].cycle == driver->cycle)
             set_point(driver, scenario->settings[i].point, scenario->settings[i].value);
+}
+
+/* ---- values for everything ----------------------------------------------------------------------------------------
+ */
+
+static bool is_kept(const struct scenario *const scenario, const char *const name)
+{
+    for (const char *const *keep = scenario->keeps; *keep; keep++)
+        if (fnmatch(*keep, name, 0) == 0)
+            return true;
+    return false;
+}
+
+/* The same for a name and a round in every run, whatever other points a driver has. */
+static uint64_t draw(const char *const name, const unsigned round)
+{
+    uint64_t state = 0xCBF29CE484222325u + round;
+    for (const char *c = name; *c; c++)
+        state = (state ^ (uint8_t)*c) * 0x100000001B3u;
+    state ^= state >> 31;
+    state *= 0x9E3779B97F4A7C15u;
+    return state ^ state >> 29;
+}
+
+static double draw_value(const int type, const uint64_t random)
+{
+    static const double s32s[] = {-2147483648.0, -1, 0, 1, 2, 3, 4, 5, 100, 2147483647};
+    static const double u32s[] = {0,      1,       2,       3,        5,         16,          50,    63,
+                                  64,     500,     1023,    1024,     2000,      9999,        20000, 60000,
+                                  250000, 1000000, 6000000, 25000000, 100000000, 4294967295.0};
+    static const double floats[] = {-1e9, -1000, -50.5, -1, -0.3, -1e-3, 0,   1e-7,      1e-3,
+                                    0.25, 0.5,   1,     2,  17.7, 100,   1e3, 12345.678, 1e9};
+    switch (type) {
+    case HAL_BIT:
+        return (double)(random & 1u);
+    case HAL_S32:
+        return s32s[random % COUNT(s32s)];
+    case HAL_U32:
+        return u32s[random % COUNT(u32s)];
+    default:
+        return floats[random % COUNT(floats)];
+    }
+}
+
+/* A quarter of all points changes in a round. */
+static void set_everything(const struct scenario *const scenario, const struct driver *const driver)
+{
+    const unsigned round = driver->cycle / scenario->settle;
+    for (size_t i = 0; i < driver->point_count; i++) {
+        const struct driver_point *const point = &driver->points[i];
+        const uint64_t random = draw(point->name, round);
+        if (point->settable && random % 4u == 0 && !is_kept(scenario, point->name))
+            driver_set(point, draw_value(point->type, random / 4u));
+    }
+}
+
+bool scenario_compares(const struct scenario *const scenario, const unsigned cycle)
+{
+    return scenario->settle == 0 || cycle % scenario->settle == scenario->settle - 1u;
 }
 
 /* ---- the world outside --------------------------------------------------------------------------------------------
@@ -127,6 +191,8 @@ void scenario_cycle(const struct scenario *const scenario, struct driver *const 
 {
     driver_begin_cycle(driver);
     apply_settings(scenario, driver);
+    if (scenario->settle > 0 && driver->cycle > 0 && driver->cycle % scenario->settle == 0)
+        set_everything(scenario, driver);
     const bool no_write = apply_events(scenario, driver);
     driver_read(driver);
     apply_waves(scenario, driver);

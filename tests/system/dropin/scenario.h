@@ -58,6 +58,10 @@ struct scenario {
     const struct wave *waves;
     const struct event *events;
     size_t setting_count, wave_count, event_count;
+    /* Not 0: so often, all points get values of their own, but those that `keeps` names; what both drivers make of them
+     * is compared in the last cycle before the next values only. */
+    unsigned settle;
+    const char *const *keeps;                 /* shell patterns, ends with NULL */
     bool paced;                               /* the card's processor takes its time */
     struct milestone reached[MAX_MILESTONES]; /* ends with a point NULL, or when full */
 };
@@ -65,6 +69,8 @@ struct scenario {
 extern const struct scenario scenarios[];
 extern const size_t scenario_count;
 
+/* Whether what happened up to this cycle is compared after it. */
+bool scenario_compares(const struct scenario *scenario, unsigned cycle);
 /* One cycle with all that belongs to it: read, then write. */
 void scenario_cycle(const struct scenario *scenario, struct driver *driver);
 

@@ -342,6 +342,32 @@ static const struct event paced_events[] = {
     {1, 0, FOLLOW, 0, 0, 4, 1},
 };
 
+/* ---- every setting there is, with good and with impossible values: what the drivers make of them once they rest */
+
+static const struct setting settings_settings[] = {
+    {0, "watchdog.timeout_ns", 100000000},
+};
+
+static const struct wave settings_waves[] = {
+    {"led.CR01", WAVE_SQUARE, 0.5, 0.5, 100, 0, 2560},
+};
+
+static const struct event settings_events[] = {
+    {1, 0, PAD, 3, SIM_LOW, 0, 0},
+};
+
+static const char *const settings_keeps[] = {
+    "packet-*",                 /* the link's own */
+    "io_error",                 /* the same */
+    "rtt-reset",                /* the same */
+    "watchdog.timeout_ns",      /* it would bite */
+    "encoder.sample-frequency", /* LinuxCNC's driver divides by it: 0 ends the process */
+    "stepgen.??.step_type",     /* LinuxCNC's driver writes beyond its memory for long tables */
+    "stepgen.??.enable",        /* nothing shall move */
+    "raw.write_*",              /* no register that either does not know of */
+    NULL,
+};
+
 const struct scenario scenarios[] = {
     SCENARIO(motion, "7i96s", "num_stepgens=5", 2000,
              .reached = {{"stepgen.04.counts", 1000}, {"encoder.00.count", 20000}}),
@@ -353,6 +379,8 @@ const struct scenario scenarios[] = {
     SCENARIO(dpll, "7i96s", "", 800, .reached = {{"dpll.ddsize", 1}, {"encoder.00.count", 5000}}),
     SCENARIO(servo, "7i93", "num_encoders=8 num_pwmgens=8 num_stepgens=4", 1500,
              .reached = {{"encoder.03.count", 500}, {"encoder.06.count", 500}, {"stepgen.00.counts", 1000}}),
+    SCENARIO(settings, "7i96s", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
+    SCENARIO(settings, "7i93", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
     SCENARIO(paced, "7i96s", "", 2000, .paced = true, .reached = {{"encoder.00.count", 15000}}),
 };
 const size_t scenario_count = COUNT(scenarios);
