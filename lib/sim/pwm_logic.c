@@ -299,6 +299,25 @@ void pwm_run(struct pwm_reference *const ref, struct pwm_channel *const c, const
     }
 }
 
+int64_t pwm_run_steady(struct pwm_reference *const ref, struct pwm_channel *const c, const int64_t n)
+{
+    const struct pwm_channel before = *c;
+    int64_t done = 0;
+    while (done < n && c->value == before.value && c->dir == before.dir && c->mode == before.mode) {
+        const int64_t now = at_least_one(least(least(registers_rest(ref, c), SKIP_MAX), n - done));
+        skip_or_step(ref, c, now);
+        done += now;
+    }
+    return done;
+}
+
+int32_t pwm_duty(const struct pwm_channel *const c)
+{
+    const uint32_t full = (c->mode & MODE_OUTPUT) == MODE_PDM ? PDM_TOP : span(c);
+    const int32_t on = c->value < full ? (int32_t)(c->value * (PDM_TOP / full)) : (int32_t)PDM_TOP;
+    return c->dir ? -on : on;
+}
+
 /* Edges before the comparator's input can change its result; 0 when a result is still on its way to the output. */
 static int64_t pwm_rests(const struct pwm_channel *const c, const struct pwm_reference *const ref)
 {

@@ -62,6 +62,12 @@ void pwm_run(struct pwm_reference *ref, struct pwm_channel *channel, int64_t n);
 /* Make edges up to and including the first one that changes an output, but at most n. Returns how many were made. */
 int64_t pwm_run_to_change(struct pwm_reference *ref, struct pwm_channel *channel, enum pwm_pin pin, int64_t n);
 
+/* Make edges up to and including the first one after which a channel has another value, direction or mode, but at most
+ * n. Returns how many were made. */
+int64_t pwm_run_steady(struct pwm_reference *ref, struct pwm_channel *channel, int64_t n);
+/* Part of the time that a channel is on, in 1/4096; negative when the direction is up. */
+int32_t pwm_duty(const struct pwm_channel *channel);
+
 bool pwm_output(const struct pwm_channel *channel, enum pwm_pin pin);
 
 #endif

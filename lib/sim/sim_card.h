@@ -89,5 +89,8 @@ int64_t sim_dpll_next_rise(struct sim_card *card, unsigned timer, int64_t clk);
 
 /* Position of a step generator at the module's present clk, 48.. bits: steps * 2^32 (for followers). */
 int64_t sim_stepgen_position(struct sim_card *card, unsigned stepgen);
+/* Likewise how far a motor has turned by a PWM generator's signed duty, while it was enabled and, as far as the looks
+ * at this position can tell, drove its pin: seconds at full duty * 2^32. */
+int64_t sim_pwmgen_position(struct sim_card *card, unsigned pwmgen);
 
 #endif

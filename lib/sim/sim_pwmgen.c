@@ -1,10 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* PWMGen, tag 06: PWM and PDM generators clocked by ClockHigh (register map 3.6, traces in folder pwmgen). */
+#include <limits.h>
+#include <string.h>
+
 #include "pwm_logic.h"
 #include "sim_card.h"
 
 #define INSTANCES_MAX 64u /* address bits 7..2 select the instance (1.1) */
 #define PS_PER_S      1000000000000
+#define NO_PIN        UINT_MAX
+#define DUTY_ONE      4096 /* pwm_duty() */
 #define PIN_A         0x81u
 #define PIN_B         0x82u
 #define PIN_ENABLE    0x83u
@@ -16,7 +21,10 @@ __extension__ typedef __int128 wide;
 struct pwmgens {
     unsigned count;
     uint32_t enable, enable_mask;
-    int64_t edges; /* of ClockHigh that have been made */
+    int64_t edges;                                      /* of ClockHigh that have been made */
+    int64_t duty[INSTANCES_MAX];                        /* sum of edges * duty while enabled, */
+    int64_t seen[INSTANCES_MAX], turned[INSTANCES_MAX]; /* at the last look, and of that what reached the pin */
+    unsigned io[INSTANCES_MAX];                         /* of the pulses; NO_PIN = on no pad */
     struct pwm_reference reference;
     struct pwm_channel channels[INSTANCES_MAX];
 };
@@ -50,12 +58,24 @@ static int64_t low_edge(const struct sim_module *const m, const int64_t j, unsig
 /* ---- life
  * --------------------------------------------------------------------------------------------------------------- */
 
+static unsigned pulse_pin(const struct hm2_idrom *const idrom, const unsigned unit)
+{
+    for (unsigned io = 0; io < idrom->pin_count; io++) {
+        const struct hm2_pd *const pd = &idrom->pins[io];
+        if (pd->secondary_tag == HM2_GTAG_PWMGEN && pd->secondary_unit == unit && pd->secondary_pin == PIN_A)
+            return io;
+    }
+    return NO_PIN;
+}
+
 static int init(struct sim_module *const m)
 {
     struct pwmgens *const p = m->state;
     if (sim_clock_low_hz(m->card) == 0 || sim_clock_high_hz(m->card) == 0)
         return HM2_ERR_RANGE;
     p->count = m->md.instances < INSTANCES_MAX ? m->md.instances : INSTANCES_MAX;
+    for (unsigned i = 0; i < p->count; i++)
+        p->io[i] = pulse_pin(sim_idrom(m->card), i);
     p->enable_mask = p->count >= 32 ? UINT32_MAX : (1u << p->count) - 1;
     return 0;
 }
@@ -68,6 +88,21 @@ static void power_up(struct sim_module *const m)
     p->reference = (struct pwm_reference){0};
     for (unsigned i = 0; i < p->count; i++)
         p->channels[i] = (struct pwm_channel){0};
+    memset(p->duty, 0, sizeof p->duty);
+    memset(p->seen, 0, sizeof p->seen);
+    memset(p->turned, 0, sizeof p->turned);
+}
+
+static void run_channel(struct pwmgens *const p, const unsigned i, const int64_t n)
+{
+    struct pwm_reference reference = p->reference;
+    const bool enabled = (uint64_t)p->enable >> i & 1u;
+    for (int64_t done = 0; done < n;) {
+        const int32_t duty = enabled ? pwm_duty(&p->channels[i]) : 0;
+        const int64_t now = pwm_run_steady(&reference, &p->channels[i], n - done);
+        p->duty[i] += now * duty;
+        done += now;
+    }
 }
 
 static void run_to(struct pwmgens *const p, const int64_t edges)
@@ -75,10 +110,8 @@ static void run_to(struct pwmgens *const p, const int64_t edges)
     const int64_t n = edges - p->edges;
     if (n <= 0)
         return;
-    for (unsigned i = 0; i < p->count; i++) {
-        struct pwm_reference reference = p->reference;
-        pwm_run(&reference, &p->channels[i], n);
-    }
+    for (unsigned i = 0; i < p->count; i++)
+        run_channel(p, i, n);
     pwm_run(&p->reference, NULL, n);
     p->edges = edges;
 }
@@ -152,6 +185,22 @@ static void trace(struct sim_module *const m, const unsigned unit, const uint8_t
         if (after != before)
             report(context, clk, ps, after ? SIM_HIGH : SIM_LOW);
     }
+}
+
+int64_t sim_pwmgen_position(struct sim_card *const card, const unsigned pwmgen)
+{
+    struct sim_module *const m = sim_find(card, HM2_GTAG_PWMGEN);
+    if (!m)
+        return 0;
+    struct pwmgens *const p = m->state;
+    const wide one = (wide)sim_clock_high_hz(card) * DUTY_ONE; /* full duty for a second */
+    if (pwmgen >= p->count || one == 0)
+        return 0;
+    if (p->io[pwmgen] == NO_PIN || sim_card_pad(card, p->io[pwmgen]) != SIM_FLOAT)
+        p->turned[pwmgen] += p->duty[pwmgen] - p->seen[pwmgen];
+    p->seen[pwmgen] = p->duty[pwmgen];
+    const wide scaled = (wide)p->turned[pwmgen] * (1ll << 32);
+    return (int64_t)(scaled / one - (scaled % one < 0));
 }
 
 const struct sim_module_ops sim_pwmgen_ops = {

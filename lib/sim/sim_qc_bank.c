@@ -33,9 +33,11 @@ void sim_qc_bank_release(struct sim_qc_bank *const bank)
 void sim_qc_bank_power_up(struct sim_module *const m, struct sim_qc_bank *const bank)
 {
     memset(bank->counters, 0, bank->count * sizeof(*bank->counters));
-    memset(bank->follows, 0, bank->count * sizeof(*bank->follows));
-    for (unsigned i = 0; i < bank->count; i++)
+    for (unsigned i = 0; i < bank->count; i++) {
         bank->counters[i].last_edge = INT64_MIN;
+        bank->follows[i].part = bank->follows[i].seen = 0; /* what it follows starts at 0, too */
+        bank->follows[i].seen_clk = m->clk;
+    }
     bank->stamps = (struct sim_timestamp){.since = m->clk};
     sim_divider_start(&bank->stamps.divider, m->clk, 0, SIM_TSDIV_TOP_BIT);
     bank->select = 0;
@@ -146,7 +148,7 @@ int64_t sim_qc_bank_sample_edge(struct sim_module *const m, const struct sim_qc_
 /* ---- followers
  * ---------------------------------------------------------------------------------------------------------- */
 
-/* When the last count came, as if the step generator had run evenly since it was looked at last: the counts lie at
+/* When the last count came, as if what it follows had run evenly since it was looked at last: the counts lie at
  * multiples of `one`, and the way went from f->part to f->part + way. */
 static int64_t last_count_clk(const struct sim_follow *const f, const sim_wide way, const sim_wide counts,
                               const sim_wide one, const int64_t clk)
@@ -154,6 +156,42 @@ static int64_t last_count_clk(const struct sim_follow *const f, const sim_wide w
     const sim_wide boundary = (counts > 0 ? counts : counts + 1) * one;
     const double fraction = (double)(boundary - f->part) / (double)way;
     return f->seen_clk + (int64_t)(fraction * (double)(clk - f->seen_clk));
+}
+
+/* The smallest multiple of `unit` at or above `position`. */
+static int64_t multiple_from(const int64_t position, const int64_t unit)
+{
+    const int64_t past = position % unit;
+    return past > 0 ? position - past + unit : position - past;
+}
+
+/* The first index on the way from one position to another, not counting the one it stands on; false when there is none.
+ * One that latches and clears always acts at the last one. */
+static bool index_on_way(const struct sim_follow *const f, const int64_t from, const int64_t to, const bool first,
+                         int64_t *const at)
+{
+    const int64_t unit = f->index_counts;
+    if (unit == 0)
+        return false;
+    const bool up = to > from;
+    const int64_t lowest = multiple_from(up ? from + 1 : to, unit);
+    const int64_t highest = -multiple_from(up ? -to : -from + 1, unit);
+    *at = first == up ? lowest : highest;
+    return lowest <= highest;
+}
+
+static void turn(struct sim_follow *const f, struct sim_qcounter *const q, const int64_t counts)
+{
+    const int64_t from = f->turned, to = from + counts;
+    int64_t at = from;
+    if (index_on_way(f, from, to, q->control & SIM_QC_JUST_ONCE, &at)) {
+        q->count = (uint16_t)(q->count + (uint64_t)(at - from));
+        sim_qcounter_index(q);
+    } else {
+        at = from;
+    }
+    q->count = (uint16_t)(q->count + (uint64_t)(to - at));
+    f->turned = to;
 }
 
 static void follow(struct sim_qc_bank *const bank, const unsigned i, const int64_t position, const int64_t clk)
@@ -166,7 +204,7 @@ static void follow(struct sim_qc_bank *const bank, const unsigned i, const int64
     const sim_wide counts = end >= 0 ? end / one : -((one - 1 - end) / one);
     if (counts != 0) {
         q->stamp = sim_timestamp_at(&bank->stamps, last_count_clk(f, way, counts, one, clk));
-        q->count = (uint16_t)(q->count + (uint64_t)counts);
+        turn(f, q, (int64_t)counts);
     }
     f->part = end - counts * one;
     f->seen = position;
@@ -176,14 +214,24 @@ static void follow(struct sim_qc_bank *const bank, const unsigned i, const int64
 void sim_qc_bank_follow(struct sim_module *const m, struct sim_qc_bank *const bank, const int64_t clk)
 {
     for (unsigned i = 0; i < bank->count; i++)
-        if (bank->follows[i].active)
-            follow(bank, i, sim_stepgen_position(m->card, bank->follows[i].stepgen), clk);
+        if (bank->follows[i].position)
+            follow(bank, i, bank->follows[i].position(m->card, bank->follows[i].unit), clk);
 }
 
 static struct sim_module *encoder_module(struct sim_card *const card, const unsigned encoder)
 {
     struct sim_module *const m = sim_find(card, HM2_GTAG_ENCODER);
     return m && encoder < m->md.instances ? m : NULL;
+}
+
+static int start_following(struct sim_module *const m, const unsigned encoder, const struct sim_follow *const what)
+{
+    struct sim_qc_bank *const bank = m->state;
+    bank->follows[encoder] = *what;
+    bank->follows[encoder].seen = what->position(m->card, what->unit);
+    bank->follows[encoder].seen_clk = m->clk;
+    m->watched = true; /* a DPLL timer that samples it must find it at the position of that moment */
+    return 0;
 }
 
 int sim_card_follow(struct sim_card *const card, const unsigned encoder, const unsigned stepgen, const int32_t num,
@@ -195,15 +243,46 @@ int sim_card_follow(struct sim_card *const card, const unsigned encoder, const u
         return HM2_ERR_NOTFOUND;
     if (den <= 0)
         return HM2_ERR_RANGE;
+    return start_following(m, encoder,
+                           &(struct sim_follow){sim_stepgen_position, .unit = stepgen, .num = num, .den = den});
+}
+
+int sim_card_motor(struct sim_card *const card, const unsigned encoder, const unsigned pwmgen,
+                   const int32_t counts_per_s)
+{
+    struct sim_module *const m = encoder_module(card, encoder);
+    const struct hm2_md *const drives = hm2_idrom_find(sim_idrom(card), HM2_GTAG_PWMGEN);
+    if (!m || !drives || pwmgen >= drives->instances)
+        return HM2_ERR_NOTFOUND;
+    return start_following(m, encoder,
+                           &(struct sim_follow){sim_pwmgen_position, .unit = pwmgen, .num = counts_per_s, .den = 1});
+}
+
+int sim_card_index(struct sim_card *const card, const unsigned encoder, const uint32_t counts)
+{
+    struct sim_module *const m = encoder_module(card, encoder);
+    if (!m)
+        return HM2_ERR_NOTFOUND;
     struct sim_qc_bank *const bank = m->state;
-    bank->follows[encoder] = (struct sim_follow){
-        .active = true,
-        .stepgen = stepgen,
-        .num = num,
-        .den = den,
-        .seen = sim_stepgen_position(card, stepgen),
-        .seen_clk = m->clk,
-    };
-    m->watched = true; /* a DPLL timer that samples it must find it at the position of that moment */
+    if (!bank->follows[encoder].position)
+        return HM2_ERR_STATE;
+    bank->follows[encoder].index_counts = counts;
+    return 0;
+}
+
+int sim_card_turned(struct sim_card *const card, const uint8_t gtag, const unsigned unit, int64_t *const position)
+{
+    const struct sim_module *const m = sim_find(card, gtag);
+    if (!m || unit >= m->md.instances)
+        return HM2_ERR_NOTFOUND;
+    if (gtag == HM2_GTAG_STEPGEN) {
+        const int64_t steps = sim_stepgen_position(card, unit);
+        *position = steps / STEP_ONE - (steps % STEP_ONE < 0);
+        return 0;
+    }
+    if (gtag != HM2_GTAG_ENCODER)
+        return HM2_ERR_NOTFOUND;
+    const struct sim_qc_bank *const bank = m->state;
+    *position = bank->follows[unit].turned;
     return 0;
 }

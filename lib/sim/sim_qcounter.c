@@ -115,14 +115,18 @@ struct events {
     bool both, index, probe;
 };
 
+static bool mask_open(const struct sim_qcounter *const q)
+{
+    return !(q->control & SIM_QC_USE_MASK) || q->mask == ((q->control & SIM_QC_MASK_POL) != 0);
+}
+
 static struct events find_events(const struct sim_qcounter *const q)
 {
     const bool a = q->first[SIM_QC_A], b = q->first[SIM_QC_B];
     const bool a_changed = a != q->second[SIM_QC_A], b_changed = b != q->second[SIM_QC_B];
-    const bool mask_open = !(q->control & SIM_QC_USE_MASK) || q->mask == ((q->control & SIM_QC_MASK_POL) != 0);
     const bool probe = q->first[SIM_QC_PROBE];
     struct events events = {
-        .index = q->first[SIM_QC_INDEX] && !q->second[SIM_QC_INDEX] && mask_open,
+        .index = q->first[SIM_QC_INDEX] && !q->second[SIM_QC_INDEX] && mask_open(q),
         .probe = probe != q->second[SIM_QC_PROBE] && probe == ((q->control & SIM_QC_PROBE_POL) != 0),
     };
     if (q->control & SIM_QC_UP_DOWN) {
@@ -166,6 +170,15 @@ static void latch_and_clear(struct sim_qcounter *const q, const struct events *c
     if (once && clear)
         fallen |= SIM_QC_CLEAR;
     q->control &= (uint16_t)~fallen;
+}
+
+void sim_qcounter_index(struct sim_qcounter *const q)
+{
+    const struct events events = {.index = mask_open(q)};
+    const bool clear = events.index && (q->control & SIM_QC_CLEAR);
+    latch_and_clear(q, &events, clear);
+    if (clear)
+        q->count = 0;
 }
 
 static void load_control(struct sim_qcounter *const q, const struct sim_qc_type *const type, const uint16_t value)

@@ -98,20 +98,24 @@ void sim_qcounter_edge(struct sim_qcounter *q, const struct sim_qc_type *type, i
 bool sim_qcounter_busy(const struct sim_qcounter *q, const struct sim_qc_type *type);
 /* Ticks change nothing any more, for ever. */
 bool sim_qcounter_settled(const struct sim_qcounter *q, const struct sim_qc_type *type);
+/* An index pulse of a follower, at the present count. */
+void sim_qcounter_index(struct sim_qcounter *q);
 
 /* ---- a module of counters -------------------------------------------------------------------------------------------
  */
 
 __extension__ typedef __int128 sim_wide;
 
-/* An encoder that turns with a step generator (sim_card_follow()). */
+/* An encoder that turns with a step generator or a motor (sim_card_follow(), sim_card_motor()). */
 struct sim_follow {
-    bool active;
-    unsigned stepgen;
+    int64_t (*position)(struct sim_card *card, unsigned unit); /* of what it follows; NULL = nothing */
+    unsigned unit;
     int32_t num, den;
-    int64_t seen;     /* stepgen position when it was looked at last, */
-    int64_t seen_clk; /* and when that was */
-    sim_wide part;    /* of the next count, in units of 1 / (den * 2^32): what floor() has left so far */
+    uint32_t index_counts; /* from index to index; 0 = it has none */
+    int64_t turned;        /* counts since it follows, over power cycles */
+    int64_t seen;          /* position when it was looked at last, */
+    int64_t seen_clk;      /* and when that was */
+    sim_wide part;         /* of the next count, in units of 1 / (den * 2^32): what floor() has left so far */
 };
 
 /* First part of the state of both encoder modules. */
@@ -132,7 +136,7 @@ uint32_t sim_qc_bank_read(struct sim_module *m, struct sim_qc_bank *bank, unsign
                           uint32_t *undriven);
 /* What a write at edge clk does to the registers that all counters share; the edge itself has been made. */
 void sim_qc_bank_write(struct sim_qc_bank *bank, int64_t clk, unsigned page, uint32_t value);
-/* Followers catch up with their step generators; m->clk is where the module is now. */
+/* Followers catch up with what they follow; m->clk is where the module is now. */
 void sim_qc_bank_follow(struct sim_module *m, struct sim_qc_bank *bank, int64_t clk);
 /* Registers of every counter, as a DPLL timer samples them just before edge clk. */
 void sim_qc_bank_sample(struct sim_qc_bank *bank, int64_t clk);

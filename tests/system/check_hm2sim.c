@@ -212,6 +212,11 @@ static const char *const bad_options[][3] = {
     {"--wire", "1:999999999999999999999", "FROM:TO"},
     {"--follow", "0:0:1/0", "ENCODER:STEPGEN"},
     {"--follow", "a", "ENCODER:STEPGEN"},
+    {"--motor", "0:0", "ENCODER:PWMGEN:COUNTS"},
+    {"--motor", "0:0:99999999999", "ENCODER:PWMGEN:COUNTS"},
+    {"--index", "0:0", "ENCODER:COUNTS"},
+    {"--switch", "3:pwmgen.0:1:01", "IO:AXIS:POSITION:LEVELS"},
+    {"--switch", "3:stepgen.0:1:0", "IO:AXIS:POSITION:LEVELS"},
     {"--drive", "3:2", "IO:LEVELS"},
     {"--drive", "3:01", "IO:LEVELS"},
     {"--mac", "00:11:22", "six bytes"},
@@ -237,6 +242,11 @@ START_TEST(what_the_card_does_not_have_is_refused)
         {"--drive", "60:1", "I/O 0 to 50"},
         {"--follow", "9:0", "no such encoder"},
         {"--follow", "0:9", "no such encoder"},
+        {"--motor", "0:9:1", "no such encoder"},
+        {"--index", "0:100", "no such encoder"},
+        {"--switch", "60:stepgen.0:1:01", "I/O 0 to 50"},
+        {"--switch", "1:stepgen.9:1:01", "no step generator 9"},
+        {"--switch", "1:encoder.9:1:01", "no encoder 9"},
         {"--firmware", "/nonexistent.hex", "/nonexistent.hex"},
         {"--bind", "192.0.2.1", "cannot listen"},
         {"--control", "/nonexistent/socket", "control socket"},
@@ -406,6 +416,35 @@ START_TEST(wires_and_followers_close_the_loop)
 }
 END_TEST
 
+static bool pad_becomes(const unsigned io, const unsigned level)
+{
+    for (unsigned i = 0; i < 4000; i++) { /* densely: there is no quiet moment between packets */
+        if ((read_register(0x1000 + 4 * (io / 17)) >> (io % 17) & 1u) == level)
+            return true;
+        usleep(500);
+    }
+    return false;
+}
+
+START_TEST(an_axis_presses_its_switches)
+{
+    start_sim((const char *const[]){"--follow", "0:0", "--switch", "0:stepgen.0:100:01", "--switch",
+                                    "0:encoder.0:300:h0", "--switch", "40:encoder.0:-50:0h", NULL});
+    ck_assert(pad_becomes(0, 0) && pad_becomes(40, 1));
+    exchange("01C20029 FFFFFFFF 01C20020 66660000", ""); /* about 610 steps a second */
+    ck_assert(pad_becomes(0, 1));                        /* from 100 on */
+    ck_assert(pad_becomes(0, 0));                        /* and 0 is stronger, from 300 on */
+    ck_assert(pad_becomes(40, 1));
+    exchange("01C20020 9A99FFFF", ""); /* and back */
+    ck_assert(pad_becomes(0, 1));
+    ck_assert(pad_becomes(0, 0));
+    ck_assert(pad_becomes(40, 0)); /* below -50 */
+    ck_assert_int_eq(process_stop(&sim, SIGTERM, END_MS), 0);
+    const char *const position = strstr(sim.text, ": encoder 0 at -");
+    ck_assert(position && strtol(strchr(position, '-'), NULL, 10) <= -50);
+}
+END_TEST
+
 /* ---- load ---------------------------------------------------------------------------------------------------------
  */
 
@@ -554,6 +593,7 @@ int main(void)
     tcase_add_test(tests, a_packet_that_waits_is_answered_after_its_wait);
     tcase_add_test(tests, pads_are_driven_by_option_and_command);
     tcase_add_test(tests, wires_and_followers_close_the_loop);
+    tcase_add_test(tests, an_axis_presses_its_switches);
     tcase_add_test(tests, eight_cards_at_1_khz_take_at_most_half_a_core);
     tcase_add_test(tests, mesaflash_reads_and_writes_a_7i96s);
     tcase_add_test(tests, mesaflash_reads_and_writes_a_7i93);

@@ -2,6 +2,9 @@
 /* Simulated encoders against the recorded firmware, and computed time against counted time. */
 #include "unit.h"
 
+#include <math.h>
+#include <stdlib.h>
+
 #include "random.h"
 #include "sim_qcounter.h"
 #include "trace_folder.h"
@@ -430,6 +433,142 @@ static void a_follower_s_time_stamps_give_its_speed(void **state)
     sim_card_free(card);
 }
 
+#define CLK_PER_S 100000000
+
+static int64_t turned(struct sim_card *const card, const int64_t clk)
+{
+    int64_t position = INT64_MIN;
+    sim_card_advance(card, clk);
+    assert_int_equal(sim_card_turned(card, HM2_GTAG_ENCODER, 0, &position), 0);
+    return position;
+}
+
+static void a_motor_turns_its_encoder_at_the_speed_of_the_duty_while_it_is_enabled(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t mode, value;
+        double duty;
+    } rows[] = {
+        {0x03, 0x08000000, 0.5}, {0x03, 0x88000000, -0.5}, {0x03, 0x0FFF0000, 4095.0 / 4096}, {0x00, 0x00800000, 0.25},
+        {0x00, 0x0FFF0000, 1},   {0x18, 0x04000000, 0.25}, {0x27, 0x84000000, -0.25},         {0x03, 0, 0},
+    };
+    for (unsigned i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        struct sim_card *const card = new_card("SVST8_4IM2_72", "7i93");
+        assert_int_equal(sim_card_motor(card, 0, 3, 80000), 0);
+        for (uint16_t port = 0; port < 3; port++)
+            sim_card_write(card, 5 + port, (uint16_t)(0x1100 + 4 * port), UINT32_MAX);
+        sim_card_write(card, 10, 0x4200, 0xFFFF);
+        sim_card_write(card, 11, 0x410C, rows[i].mode);
+        sim_card_write(card, 12, 0x400C, rows[i].value);
+        assert_int_equal(turned(card, CLK_PER_S), 0);
+        sim_card_write(card, CLK_PER_S, 0x4400, 1u << 3);
+        const int64_t end = turned(card, 3 * (int64_t)CLK_PER_S / 2);
+        if (fabs((double)end - 40000 * rows[i].duty) > 1)
+            fail_msg("row %u: %lld counts", i, (long long)end);
+        sim_card_write(card, 3 * (int64_t)CLK_PER_S / 2, 0x4400, ~(1u << 3));
+        assert_true(llabs(turned(card, 4 * (int64_t)CLK_PER_S) - end) <= 1);
+        assert_int_equal(count_of(card, 4 * (int64_t)CLK_PER_S + 1, NULL), (int16_t)end);
+        sim_card_free(card);
+    }
+}
+
+static void a_motor_rests_when_its_pin_is_no_output_any_more(void **state)
+{
+    (void)state;
+    struct sim_card *const card = new_card("SVST8_4IM2_72", "7i93");
+    assert_int_equal(sim_card_motor(card, 0, 0, 80000), 0);
+    sim_card_write(card, 10, 0x4200, 0xFFFF);
+    sim_card_write(card, 11, 0x4100, 0x03);
+    sim_card_write(card, 12, 0x4000, 0x08000000);
+    sim_card_write(card, 13, 0x4400, 1);
+    assert_int_equal(turned(card, CLK_PER_S), 0);
+    sim_card_write(card, CLK_PER_S, 0x1100, 1u << 7);
+    const int64_t end = turned(card, 2 * (int64_t)CLK_PER_S);
+    assert_true(llabs(end - 40000) <= 1);
+    sim_card_write(card, 2 * (int64_t)CLK_PER_S, 0x1100, 0);
+    assert_int_equal(turned(card, 3 * (int64_t)CLK_PER_S), end);
+    sim_card_free(card);
+}
+
+/* How the driver looks for an index: latch and clear, once (register map 3.5.2). */
+#define ONCE  0x40u
+#define CLEAR 0x20u
+#define LATCH 0x10u
+
+static void the_index_of_a_follower_latches_and_clears_where_it_is(void **state)
+{
+    (void)state;
+    static const struct {
+        int32_t counts_a_step;
+        uint32_t control;
+        int16_t count, latch; /* after 8000 counts, an index every 3000 */
+        uint32_t left;
+    } rows[] = {
+        {8, ONCE | CLEAR | LATCH, 5000, 3000, ONCE},
+        {-8, ONCE | CLEAR | LATCH, -5000, -3000, ONCE},
+        {8, CLEAR | LATCH, 2000, 3000, CLEAR | LATCH}, /* the second index finds 3000, too */
+        {8, LATCH, 8000, 6000, LATCH},
+        {8, 0, 8000, 0, 0},
+    };
+    for (unsigned i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        struct sim_card *const card = new_card("SVST8_4IM2_72", "7i93");
+        assert_int_equal(sim_card_index(card, 0, 3000), HM2_ERR_STATE);
+        assert_int_equal(sim_card_follow(card, 0, 0, rows[i].counts_a_step, 1), 0);
+        assert_int_equal(sim_card_index(card, 0, 3000), 0);
+        sim_card_write(card, 50, 0x3100, rows[i].control);
+        start_stepgen(card, 100, 4294967u); /* 1 step per 1000 clocks */
+        int64_t clk = 1000;
+        while (llabs(turned(card, clk)) < 8000)
+            clk += 1000;
+        const int64_t more = turned(card, clk) - (rows[i].counts_a_step > 0 ? 8000 : -8000);
+        const uint32_t control = sim_card_read(card, clk, 0x3100, NULL);
+        assert_true(llabs(more) <= 8);
+        assert_int_equal(count_of(card, clk, NULL), rows[i].count + more);
+        assert_int_equal((int16_t)(control >> 16), rows[i].latch);
+        assert_int_equal(control & (ONCE | CLEAR | LATCH), rows[i].left);
+        sim_card_free(card);
+    }
+}
+
+static void one_look_finds_every_index_on_the_way(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t control;
+        int16_t count, latch;
+    } rows[] = {{ONCE | CLEAR | LATCH, 5000, 3000}, {LATCH, 8000, 6000}};
+    for (unsigned i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        struct sim_card *const card = new_card("SVST8_4IM2_72", "7i93");
+        assert_int_equal(sim_card_follow(card, 0, 0, 8, 1), 0);
+        assert_int_equal(sim_card_index(card, 0, 3000), 0);
+        sim_card_write(card, 50, 0x3100, rows[i].control);
+        start_stepgen(card, 100, 4294967u);
+        const int16_t count = count_of(card, 1000000, NULL); /* some 1000 steps */
+        assert_true(abs(count - rows[i].count) < 16);
+        assert_int_equal(sim_card_read(card, 1000001, 0x3100, NULL) >> 16, rows[i].latch);
+        sim_card_free(card);
+    }
+}
+
+static void a_power_cycle_clears_the_count_and_not_the_axis(void **state)
+{
+    (void)state;
+    struct sim_card *const card = new_card("SVST8_4IM2_72", "7i93");
+    assert_int_equal(sim_card_follow(card, 0, 0, 4, 1), 0);
+    start_stepgen(card, 100, 4294967u);
+    const int64_t before = turned(card, 1000000);
+    assert_int_equal(count_of(card, 1000000, NULL), before);
+    sim_card_power_cycle(card);
+    assert_int_equal(turned(card, 1100000), before);
+    assert_int_equal(count_of(card, 1100001, NULL), 0);
+    start_stepgen(card, 1200000, 4294967u);
+    const int64_t after = turned(card, 2200000);
+    assert_true(after > before + 3900);
+    assert_int_equal(count_of(card, 2200000, NULL), after - before);
+    sim_card_free(card);
+}
+
 static void following_needs_what_the_card_has(void **state)
 {
     (void)state;
@@ -437,6 +576,13 @@ static void following_needs_what_the_card_has(void **state)
     assert_int_equal(sim_card_follow(card, 8, 0, 1, 1), HM2_ERR_NOTFOUND);
     assert_int_equal(sim_card_follow(card, 0, 4, 1, 1), HM2_ERR_NOTFOUND);
     assert_int_equal(sim_card_follow(card, 0, 0, 1, 0), HM2_ERR_RANGE);
+    assert_int_equal(sim_card_motor(card, 8, 0, 1), HM2_ERR_NOTFOUND);
+    assert_int_equal(sim_card_motor(card, 0, 8, 1), HM2_ERR_NOTFOUND);
+    assert_int_equal(sim_card_index(card, 8, 1), HM2_ERR_NOTFOUND);
+    int64_t position;
+    assert_int_equal(sim_card_turned(card, HM2_GTAG_ENCODER, 8, &position), HM2_ERR_NOTFOUND);
+    assert_int_equal(sim_card_turned(card, HM2_GTAG_STEPGEN, 4, &position), HM2_ERR_NOTFOUND);
+    assert_int_equal(sim_card_turned(card, HM2_GTAG_PWMGEN, 0, &position), HM2_ERR_NOTFOUND);
     sim_card_free(card);
 }
 
@@ -452,6 +598,11 @@ int main(void)
         cmocka_unit_test(counts_are_those_of_the_selected_timer_s_last_rise),
         cmocka_unit_test(an_encoder_follows_its_step_generator_with_floor),
         cmocka_unit_test(a_follower_s_time_stamps_give_its_speed),
+        cmocka_unit_test(a_motor_turns_its_encoder_at_the_speed_of_the_duty_while_it_is_enabled),
+        cmocka_unit_test(a_motor_rests_when_its_pin_is_no_output_any_more),
+        cmocka_unit_test(the_index_of_a_follower_latches_and_clears_where_it_is),
+        cmocka_unit_test(one_look_finds_every_index_on_the_way),
+        cmocka_unit_test(a_power_cycle_clears_the_count_and_not_the_axis),
         cmocka_unit_test(following_needs_what_the_card_has),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

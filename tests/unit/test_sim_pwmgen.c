@@ -104,6 +104,35 @@ static void every_change_of_an_output_is_found(void **state)
     assert_true(changes > 10000);
 }
 
+static void a_steady_stretch_ends_with_the_edge_that_changes_the_command(void **state)
+{
+    (void)state;
+    unsigned changes = 0;
+    for (uint64_t seed = 1; seed <= 200; seed++) {
+        struct random r = {seed};
+        struct pwm_reference refs[2] = {0};
+        struct pwm_channel channels[2] = {0};
+        for (unsigned op = 0; op < 30; op++) {
+            write_any(&r, refs, channels);
+            const int64_t n = random_below(&r, random_below(&r, 3) ? 12 : 9000);
+            for (int64_t done = 0; done < n;) {
+                const int32_t before = pwm_duty(&channels[0]);
+                const int64_t made = pwm_run_steady(&refs[1], &channels[1], n - done);
+                assert_true(made >= 1 && made <= n - done);
+                for (int64_t i = 0; i < made; i++) {
+                    assert_int_equal(pwm_duty(&channels[0]), before);
+                    pwm_channel_edge(&channels[0], &refs[0]);
+                    pwm_reference_edge(&refs[0]);
+                }
+                done += made;
+                assert_memory_equal(&channels[0], &channels[1], sizeof(channels[0]));
+                changes += pwm_duty(&channels[1]) != before;
+            }
+        }
+    }
+    assert_true(changes > 1000);
+}
+
 static void a_long_rest_is_skipped_as_many_short_ones(void **state)
 {
     (void)state;
@@ -225,6 +254,7 @@ int main(void)
         cmocka_unit_test(the_recorded_generators_are_matched_at_every_edge_of_the_high_clock),
         cmocka_unit_test(skipped_edges_leave_the_same_state),
         cmocka_unit_test(every_change_of_an_output_is_found),
+        cmocka_unit_test(a_steady_stretch_ends_with_the_edge_that_changes_the_command),
         cmocka_unit_test(a_long_rest_is_skipped_as_many_short_ones),
         cmocka_unit_test(what_is_watched_does_not_depend_on_when_the_card_is_asked),
         cmocka_unit_test(an_output_that_nobody_watches_is_right_when_looked_at),

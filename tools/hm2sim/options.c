@@ -212,6 +212,86 @@ bool options_level(const char letter, enum sim_level *const level)
     return true;
 }
 
+static bool read_signed(const char *const text, const long max, const char **const end, long *const value)
+{
+    unsigned long size;
+    const bool negative = *text == '-';
+    if (!read_unsigned(text + negative, (unsigned long)max, end, &size))
+        return false;
+    *value = negative ? -(long)size : (long)size;
+    return true;
+}
+
+/* ENCODER:PWMGEN:COUNTS */
+static int add_motor(struct reading *const r, const char *const value)
+{
+    unsigned long encoder, pwmgen;
+    long counts;
+    const char *at;
+    if (!read_unsigned(value, UINT8_MAX, &at, &encoder) || *at != ':' ||
+        !read_unsigned(at + 1, UINT8_MAX, &at, &pwmgen) || *at != ':' ||
+        !read_signed(at + 1, INT32_MAX, &at, &counts) || *at != '\0')
+        return refuse(r, "--motor", value, "ENCODER:PWMGEN:COUNTS, counts a second at full duty");
+    if (r->card->motor_count == MAX_WIRES)
+        return refuse(r, "--motor", value, "at most 32 motors a card");
+    r->card->motors[r->card->motor_count++] = (struct motor){(unsigned)encoder, (unsigned)pwmgen, (int32_t)counts};
+    return 0;
+}
+
+/* ENCODER:COUNTS */
+static int add_index(struct reading *const r, const char *const value)
+{
+    unsigned long encoder, counts;
+    const char *at;
+    if (!read_unsigned(value, UINT8_MAX, &at, &encoder) || *at != ':' || !whole_unsigned(at + 1, INT32_MAX, &counts) ||
+        counts == 0)
+        return refuse(r, "--index", value, "ENCODER:COUNTS, from one index to the next");
+    if (r->card->index_count == MAX_WIRES)
+        return refuse(r, "--index", value, "at most 32 encoders with an index a card");
+    r->card->indices[r->card->index_count++] = (struct encoder_index){(unsigned)encoder, (uint32_t)counts};
+    return 0;
+}
+
+/* "stepgen.N" or "encoder.N" */
+static bool read_axis(const char *const text, const char **const end, struct position_switch *const s)
+{
+    static const struct {
+        const char *name;
+        uint8_t gtag;
+    } kinds[] = {{"stepgen.", HM2_GTAG_STEPGEN}, {"encoder.", HM2_GTAG_ENCODER}};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+        const size_t len = strlen(kinds[i].name);
+        unsigned long unit;
+        if (strncmp(text, kinds[i].name, len) != 0 || !read_unsigned(text + len, UINT8_MAX, end, &unit))
+            continue;
+        s->gtag = kinds[i].gtag;
+        s->unit = (unsigned)unit;
+        return true;
+    }
+    return false;
+}
+
+/* IO:AXIS:POSITION:LEVELS */
+static int add_switch(struct reading *const r, const char *const value)
+{
+    struct position_switch s;
+    unsigned long io;
+    long position;
+    const char *at;
+    if (!read_unsigned(value, HM2_MAX_PINS, &at, &io) || *at != ':' || !read_axis(at + 1, &at, &s) || *at != ':' ||
+        !read_signed(at + 1, INT32_MAX, &at, &position) || *at != ':' || strlen(at + 1) != 2 ||
+        !options_level(at[1], &s.below) || !options_level(at[2], &s.above))
+        return refuse(r, "--switch", value,
+                      "IO:AXIS:POSITION:LEVELS, an axis such as stepgen.0 or encoder.0, and two of the levels 0, 1, z, "
+                      "h: below the position, and from there on");
+    if (r->card->switch_count == MAX_WIRES)
+        return refuse(r, "--switch", value, "at most 32 switches a card");
+    s.io = (unsigned)io;
+    s.position = position;
+    r->card->switches[r->card->switch_count++] = s;
+    return 0;
+}
+
 /* IO:LEVELS[:MS] */
 static int add_pattern(struct reading *const r, const char *const value)
 {
@@ -297,6 +377,9 @@ enum {
     OPT_FAULTS,
     OPT_WIRE,
     OPT_FOLLOW,
+    OPT_MOTOR,
+    OPT_INDEX,
+    OPT_SWITCH,
     OPT_DRIVE,
     OPT_MAC,
     OPT_LATENCY,
@@ -318,6 +401,9 @@ static const struct option long_options[] = {
     {"faults", required_argument, NULL, OPT_FAULTS},
     {"wire", required_argument, NULL, OPT_WIRE},
     {"follow", required_argument, NULL, OPT_FOLLOW},
+    {"motor", required_argument, NULL, OPT_MOTOR},
+    {"index", required_argument, NULL, OPT_INDEX},
+    {"switch", required_argument, NULL, OPT_SWITCH},
     {"drive", required_argument, NULL, OPT_DRIVE},
     {"mac", required_argument, NULL, OPT_MAC},
     {"latency", no_argument, NULL, OPT_LATENCY},
@@ -359,6 +445,9 @@ static void print_help(void)
           "  --mac XX:XX:XX:XX:XX:XX\n"
           "  --wire FROM:TO      connect two I/O pins\n"
           "  --follow ENC:STEPGEN[:NUM/DEN]  the encoder turns with the step generator\n"
+          "  --motor ENC:PWMGEN:COUNTS       the encoder turns with a motor, COUNTS a second at full duty\n"
+          "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
+          "  --switch IO:AXIS:POSITION:LEVELS  below the position of stepgen.N or encoder.N one level, then another\n"
           "  --drive IO:LEVELS[:MS]  0, 1, z (floating), h (pulled up), MS milliseconds each\n"
           "\n"
           "When all cards listen, one line \"ready CARD@ADDRESS:PORT ...\" is printed. SIGINT and SIGTERM end it.\n",
@@ -406,6 +495,12 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_wire(r, value);
     case OPT_FOLLOW:
         return add_follower(r, value);
+    case OPT_MOTOR:
+        return add_motor(r, value);
+    case OPT_INDEX:
+        return add_index(r, value);
+    case OPT_SWITCH:
+        return add_switch(r, value);
     default:
         return add_pattern(r, value);
     }

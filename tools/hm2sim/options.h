@@ -23,6 +23,26 @@ struct follower {
     int32_t num, den;
 };
 
+/* A motor at a PWM generator, with an encoder on its shaft. */
+struct motor {
+    unsigned encoder, pwmgen;
+    int32_t counts_per_s; /* at full duty */
+};
+
+struct encoder_index {
+    unsigned encoder;
+    uint32_t counts; /* from one to the next */
+};
+
+/* What an axis does to a pad: one level below a position, another from there on. */
+struct position_switch {
+    unsigned io;
+    uint8_t gtag; /* stepgen or encoder */
+    unsigned unit;
+    int64_t position;
+    enum sim_level below, above;
+};
+
 /* Levels that the world puts on a pad, one after the other and round again; a single one is for good. */
 struct pattern {
     unsigned io;
@@ -37,9 +57,12 @@ struct card_options {
     uint16_t port;
     const char *firmware; /* file */
     uint8_t mac[6];
-    unsigned wire_count, follower_count, pattern_count;
+    unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count;
     struct wire wires[MAX_WIRES];
     struct follower followers[MAX_WIRES];
+    struct motor motors[MAX_WIRES];
+    struct encoder_index indices[MAX_WIRES];
+    struct position_switch switches[MAX_WIRES];
     struct pattern patterns[MAX_PATTERNS];
 };
 

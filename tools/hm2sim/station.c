@@ -11,7 +11,8 @@
 #include <unistd.h>
 
 #define MAX_FIRMWARE_BYTES (1u << 20)
-#define WIRED_STEP_NS      5000000 /* edges on wires are made at least this often, not all at the next packet */
+#define WIRED_STEP_NS \
+    5000000 /* edges on wires and of switches are made at least this often, not all at the next packet */
 
 /* ---- clients ------------------------------------------------------------------------------------------------------
  */
@@ -52,6 +53,14 @@ static void drive_patterns(struct station *const s, const int64_t now_ns)
     }
 }
 
+static void press_switches(struct station *const s, const int64_t now_ns)
+{
+    if (s->options->switch_count == 0)
+        return;
+    sim_card_advance(s->card, sim_card_clock_at(s->card, now_ns));
+    axes_run(&s->axes);
+}
+
 void station_receive(struct station *const s, const int64_t now_ns)
 {
     uint8_t data[2048];
@@ -63,6 +72,7 @@ void station_receive(struct station *const s, const int64_t now_ns)
         return;
     s->requests++;
     drive_patterns(s, now_ns); /* what was due before it came has happened, whichever the loop looked at first */
+    press_switches(s, now_ns);
     sim_net_arrive(s->net, now_ns, client_number(&from), data, (size_t)len);
 }
 
@@ -70,6 +80,7 @@ void station_run(struct station *const s, const int64_t now_ns)
 {
     drive_patterns(s, now_ns);
     sim_net_sleep_until(s->net, now_ns);
+    press_switches(s, now_ns);
 }
 
 int64_t station_next_ns(const struct station *const s)
@@ -78,7 +89,7 @@ int64_t station_next_ns(const struct station *const s)
     for (unsigned i = 0; i < s->options->pattern_count; i++)
         if (s->pattern_due_ns[i] < next_ns)
             next_ns = s->pattern_due_ns[i];
-    if (s->options->wire_count > 0) {
+    if (s->options->wire_count > 0 || s->options->switch_count > 0) {
         const int64_t step_ns = link_now_ns(sim_net_link(s->net)) + WIRED_STEP_NS;
         next_ns = step_ns < next_ns ? step_ns : next_ns;
     }
@@ -134,13 +145,6 @@ static int connect_pins(struct station *const s, struct hm2_diag *const diag)
                                 err == HM2_ERR_STATE ? "the pin has a wire already, or the wires make a ring"
                                                      : "this card has no such pin");
     }
-    for (unsigned i = 0; i < o->follower_count; i++) {
-        const struct follower *const f = &o->followers[i];
-        const int err = sim_card_follow(s->card, f->encoder, f->stepgen, f->num, f->den);
-        if (err)
-            return hm2_diag_add(diag, err, "--follow %u:%u: this card has no such encoder or step generator",
-                                f->encoder, f->stepgen);
-    }
     for (unsigned i = 0; i < o->pattern_count; i++)
         if (o->patterns[i].io >= sim_card_idrom(s->card)->pin_count)
             return hm2_diag_add(diag, HM2_ERR_RANGE, "--drive %u: this card has I/O 0 to %u", o->patterns[i].io,
@@ -174,6 +178,8 @@ int station_open(struct station *const s, const struct options *const options, c
         err = sim_net_new(&s->net, s->card, &faults);
     if (!err)
         err = connect_pins(s, diag);
+    if (!err)
+        err = axes_connect(&s->axes, card, s->card, diag);
     if (!err)
         err = open_socket(card->address, card->port, &s->socket, &s->address, diag);
     if (!err)
@@ -223,4 +229,5 @@ void station_print_stats(const struct station *const s)
                    faults[i].count[1]);
     if (t.unheard > 0)
         printf("%s: unheard while frozen %" PRIu64 "\n", name, t.unheard);
+    axes_print(&s->axes, name);
 }

@@ -3,11 +3,12 @@
 #ifndef HM2SIM_STATION_H
 #define HM2SIM_STATION_H
 
-#include "options.h"
+#include "axes.h"
 
 struct station {
     const struct card_options *options;
     struct sim_card *card;
+    struct axes axes;
     struct sim_net *net;
     int socket, foreign_socket; /* -1 = not open */
     struct sockaddr_in address;

@@ -86,6 +86,16 @@ HM2_API int HM2_MUST_CHECK sim_card_drive_input(struct sim_card *card, int64_t c
  * with the time stamp that the last count would have. No edges, no cost per count. */
 HM2_API int HM2_MUST_CHECK sim_card_follow(struct sim_card *card, unsigned encoder, unsigned stepgen, int32_t num,
                                            int32_t den);
+/* The same with a motor whose drive takes a PWM generator for the commanded speed, and obeys at once: counts_per_s at
+ * full duty, backwards when the direction is high; negative turns both round. It rests while the generator is not
+ * enabled and while the FPGA does not drive its pin. */
+HM2_API int HM2_MUST_CHECK sim_card_motor(struct sim_card *card, unsigned encoder, unsigned pwmgen,
+                                          int32_t counts_per_s);
+/* An encoder that follows or has a motor shows its index at every multiple of so many counts. */
+HM2_API int HM2_MUST_CHECK sim_card_index(struct sim_card *card, unsigned encoder, uint32_t counts);
+/* Where an axis is, since the card was made: counts of such an encoder (tag 04), whole steps of a step generator (05).
+ */
+HM2_API int HM2_MUST_CHECK sim_card_turned(struct sim_card *card, uint8_t gtag, unsigned unit, int64_t *position);
 
 /* ---- packets ---------------------------------------------------------------------------------------------------- */
 

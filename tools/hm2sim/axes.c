@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "axes.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+static int connect_encoders(const struct axes *const a, struct hm2_diag *const diag)
+{
+    const struct card_options *const o = a->options;
+    for (unsigned i = 0; i < o->follower_count; i++) {
+        const struct follower *const f = &o->followers[i];
+        const int err = sim_card_follow(a->card, f->encoder, f->stepgen, f->num, f->den);
+        if (err)
+            return hm2_diag_add(diag, err, "--follow %u:%u: this card has no such encoder or step generator",
+                                f->encoder, f->stepgen);
+    }
+    for (unsigned i = 0; i < o->motor_count; i++) {
+        const struct motor *const m = &o->motors[i];
+        const int err = sim_card_motor(a->card, m->encoder, m->pwmgen, m->counts_per_s);
+        if (err)
+            return hm2_diag_add(diag, err, "--motor %u:%u: this card has no such encoder or PWM generator", m->encoder,
+                                m->pwmgen);
+    }
+    for (unsigned i = 0; i < o->index_count; i++) {
+        const int err = sim_card_index(a->card, o->indices[i].encoder, o->indices[i].counts);
+        if (err)
+            return hm2_diag_add(diag, err, "--index %u: this card has no such encoder with --follow or --motor",
+                                o->indices[i].encoder);
+    }
+    return 0;
+}
+
+int axes_connect(struct axes *const axes, const struct card_options *const options, struct sim_card *const card,
+                 struct hm2_diag *const diag)
+{
+    *axes = (struct axes){.options = options, .card = card};
+    const int err = connect_encoders(axes, diag);
+    if (err)
+        return err;
+    for (unsigned i = 0; i < options->switch_count; i++) {
+        const struct position_switch *const s = &options->switches[i];
+        const unsigned pins = sim_card_idrom(card)->pin_count;
+        int64_t position;
+        if (s->io >= pins)
+            return hm2_diag_add(diag, HM2_ERR_RANGE, "--switch %u: this card has I/O 0 to %u", s->io, pins - 1);
+        if (sim_card_turned(card, s->gtag, s->unit, &position))
+            return hm2_diag_add(diag, HM2_ERR_NOTFOUND, "--switch %u: this card has no %s %u", s->io,
+                                s->gtag == HM2_GTAG_STEPGEN ? "step generator" : "encoder", s->unit);
+    }
+    return 0;
+}
+
+static enum sim_level level_of(const struct axes *const axes, const struct position_switch *const s)
+{
+    int64_t position = 0;
+    (void)!sim_card_turned(axes->card, s->gtag, s->unit, &position); /* axes_connect() has tried */
+    return position < s->position ? s->below : s->above;
+}
+
+/* Of several switches on one pad the strongest has its way: to 0, to 1, pulled up, open. */
+static enum sim_level stronger(const enum sim_level one, const enum sim_level other)
+{
+    static const unsigned rank[] = {[SIM_LOW] = 0, [SIM_HIGH] = 1, [SIM_PULLUP] = 2, [SIM_FLOAT] = 3};
+    return rank[one] <= rank[other] ? one : other;
+}
+
+void axes_run(struct axes *const axes)
+{
+    const struct card_options *const o = axes->options;
+    for (unsigned i = 0; i < o->switch_count; i++) {
+        enum sim_level level = SIM_FLOAT;
+        for (unsigned k = 0; k < o->switch_count; k++)
+            if (o->switches[k].io == o->switches[i].io)
+                level = stronger(level, level_of(axes, &o->switches[k]));
+        if (axes->pressed[i] && axes->levels[i] == level)
+            continue;
+        axes->pressed[i] = true;
+        axes->levels[i] = level;
+        (void)!sim_card_drive(axes->card, sim_card_clock(axes->card), o->switches[i].io, level);
+    }
+}
+
+void axes_print(const struct axes *const axes, const char *const name)
+{
+    const unsigned encoders = axes->options->follower_count + axes->options->motor_count;
+    int64_t position;
+    for (unsigned unit = 0; encoders > 0 && sim_card_turned(axes->card, HM2_GTAG_ENCODER, unit, &position) == 0; unit++)
+        printf("%s: encoder %u at %" PRId64 "\n", name, unit, position);
+}
