@@ -24,20 +24,32 @@ struct config {
     const char *name;              /* tests/system/linuxcnc/NAME.conf */
     const char *prefix;            /* of the card's pins */
     double end[JOINTS];            /* where the program ends */
+    const char *feedback;          /* pin of a joint, behind the prefix; NULL when homing sets it apart from the axis */
+    double accuracy;               /* of feedback and axes' position, in units */
+    const char *registers[JOINTS]; /* where the card counts steps, or NULL: encoders turn with motors */
     double scale[JOINTS];          /* steps or counts a unit */
-    const char *feedback;          /* pin of a joint, with %u for the joint */
-    double accuracy;               /* of the axes' position, in units */
-    const char *registers[JOINTS]; /* registers that hold the position of step generators, or NULL */
+    /* Motors: where the axis is in counts from power-up when its position is 0, and how exactly homing finds that. */
+    double zero[JOINTS], exactness[JOINTS];
 };
+
+#define LATENESS_COUNTS 200 /* at the sample's latch velocity of 8192 counts a second: 24 ms without a servo cycle */
 
 static const struct config configs[] = {
     {.name = "hm2-stepper",
      .prefix = "hm2_7i93.0",
      .end = {0.75, 0.3125, 0.5},
-     .scale = {1000, 1000, 1000},
      .feedback = "stepgen.%02u.position-fb",
      .accuracy = 0.001,
-     .registers = {"0x2100", "0x2104", "0x2108"}},
+     .registers = {"0x2100", "0x2104", "0x2108"},
+     .scale = {1000, 1000, 1000}},
+    {.name = "hm2-servo",
+     .prefix = "hm2_7i93.0",
+     .end = {0.75, 0.3125, 0.5},
+     .accuracy = 0.0001,
+     .scale = {81920, -81920, 81920},
+     /* HOME_OFFSET is -2.9 at the switch, or at the index behind it. */
+     .zero = {-41943 + 2.9 * 81920, 5 * 8192 - 2.9 * 81920, -41943 + 2.9 * 81920},
+     .exactness = {LATENESS_COUNTS, 3, LATENESS_COUNTS}},
 };
 
 static struct process run;
@@ -135,12 +147,12 @@ static void check_position(const struct config *const config, const char *const 
 
 static void check_feedback(const struct config *const config)
 {
-    char format[64], name[64];
-    for (unsigned i = 0; i < JOINTS; i++) {
-        snprintf(format, sizeof format, "%s", config->feedback);
-        char *const number = strstr(format, "%02u");
-        ck_assert_ptr_nonnull(number);
-        snprintf(name, sizeof name, "%.*s%02u%s", (int)(number - format), format, i, number + 4);
+    static const char number[] = "%02u";
+    const char *const hole = config->feedback ? strstr(config->feedback, number) : NULL;
+    char name[64];
+    for (unsigned i = 0; hole && i < JOINTS; i++) {
+        snprintf(name, sizeof name, "%.*s%02u%s", (int)(hole - config->feedback), config->feedback, i,
+                 hole + strlen(number));
         const double at = strtod(pin(config, name), NULL);
         if (fabs(at - config->end[i]) > config->accuracy)
             ck_abort_msg("%s is %.6f, not %.6f", name, at, config->end[i]);
@@ -156,6 +168,22 @@ static void check_steps(const struct config *const config)
         const double steps = (int32_t)(uint32_t)strtoul(said(start), NULL, 16) / PARTS_OF_A_STEP;
         if (fabs(steps - config->end[i] * config->scale[i]) > 1)
             ck_abort_msg("step generator %u made %.3f steps, not %.3f", i, steps, config->end[i] * config->scale[i]);
+    }
+}
+
+/* Where the motors really are: homing found its switches and the index, and motion went from there. */
+static void check_motors(const struct config *const config)
+{
+    for (unsigned i = 0; i < JOINTS && !config->registers[0]; i++) {
+        char place[64];
+        snprintf(place, sizeof place, ": encoder %u at ", i);
+        const char *const at = strstr(run.text, place);
+        if (!at)
+            give_up(place);
+        const double counts = strtod(at + strlen(place), NULL);
+        const double expected = config->zero[i] + config->end[i] * config->scale[i];
+        if (fabs(counts - expected) > config->exactness[i])
+            ck_abort_msg("motor %u is at %.0f, not %.0f counts", i, counts, expected);
     }
 }
 
@@ -194,6 +222,7 @@ START_TEST(a_configuration_of_others_homes_and_ends_where_its_program_says)
     check_position(config, "operator: actual ", config->accuracy);
     check_feedback(config);
     check_steps(config);
+    check_motors(config);
     check_card_was_there(config);
     (void)said("operator: done");
 }
