@@ -36,6 +36,8 @@ struct sim_net {
     uint64_t client; /* of the datagram that is being carried */
     sim_net_deliver_fn deliver;
     void *deliver_context;
+    sim_net_taken_fn taken;
+    void *taken_context;
 
     struct datagram pool[ON_THE_WAY];
     unsigned waiting[ON_THE_WAY]; /* pool indices: the first waiting_count are on their way, the rest free */
@@ -172,6 +174,12 @@ static void to_client(struct sim_net *const net, const struct datagram *const d)
     net->truth.delivered[TO_CLIENT]++;
 }
 
+static void tell_taken(const struct sim_net *const net, const struct datagram *const d, const bool done)
+{
+    if (net->taken && !d->foreign)
+        net->taken(net->taken_context, d->data, d->len, done);
+}
+
 static void to_card(struct sim_net *const net, const struct datagram *const d)
 {
     uint8_t reply[LINK_MAX_DATAGRAM_BYTES];
@@ -182,7 +190,9 @@ static void to_card(struct sim_net *const net, const struct datagram *const d)
     }
     if (!d->foreign)
         net->truth.delivered[TO_CARD]++;
+    tell_taken(net, d, false);
     const size_t len = sim_card_packet(net->card, net->now_ns, d->data, d->len, reply, sizeof reply, &reply_ns);
+    tell_taken(net, d, true);
     const bool at_once = net->instant && reply_ns - net->now_ns < LONG_WORK_NS;
     net->client = d->client;
     if (len > 0 && !d->foreign)
@@ -355,6 +365,12 @@ void sim_net_on_deliver(struct sim_net *const net, const sim_net_deliver_fn fn, 
 {
     net->deliver = fn;
     net->deliver_context = context;
+}
+
+void sim_net_on_taken(struct sim_net *const net, const sim_net_taken_fn fn, void *const context)
+{
+    net->taken = fn;
+    net->taken_context = context;
 }
 
 void sim_net_arrive(struct sim_net *const net, const int64_t now_ns, const uint64_t client, const uint8_t *const data,

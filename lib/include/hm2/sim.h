@@ -155,6 +155,11 @@ struct sim_net_truth {
 };
 HM2_API struct sim_net_truth sim_net_truth(const struct sim_net *net);
 
+/* Called just before (done = false) and just after the card takes a datagram of a client; not for a stranger's. For
+ * tests that note what the card has at that moment. fn = NULL ends it. */
+typedef void (*sim_net_taken_fn)(void *context, const uint8_t *data, size_t len, bool done);
+HM2_API void sim_net_on_taken(struct sim_net *net, sim_net_taken_fn fn, void *context);
+
 /* The same network for clients outside, by number: what is delivered goes to a function instead of the link. A
  * program calls sim_net_arrive() when a client's datagram came, sim_net_sleep_until() when its own time has come to
  * sim_net_next_ns(), and sends what it is handed. */
