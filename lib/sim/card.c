@@ -29,9 +29,8 @@ void sim_sync(struct sim_module *const m)
 
 static void sync_watched(struct sim_card *const card)
 {
-    for (unsigned i = 0; i < card->module_count; i++)
-        if (card->modules[i].watched)
-            sim_sync(&card->modules[i]);
+    for (unsigned i = 0; i < card->watched_count; i++)
+        sim_sync(card->watched[i]);
 }
 
 /* All edges before clk happen; after each edge that somebody may see, everybody looks. */
@@ -111,8 +110,6 @@ static void write_module(struct sim_card *const card, const uint16_t address, co
         return;
     sim_sync(m);
     m->ops->write(m, (unsigned)((address - m->md.base) >> PAGE_SHIFT), address & 0xFCu, value);
-    if (m == card->ioport)
-        card->pads_stale = true;
 }
 
 void sim_card_write(struct sim_card *const card, const int64_t clk, const uint16_t address, const uint32_t value)
@@ -160,6 +157,20 @@ struct sim_module *sim_module_of(struct sim_card *const card, const uint8_t gtag
         if (card->modules[i].md.gtag == gtag)
             return &card->modules[i];
     return NULL;
+}
+
+void sim_watch_module(struct sim_module *const m)
+{
+    struct sim_card *const card = m->card;
+    for (unsigned i = 0; i < card->watched_count; i++)
+        if (card->watched[i] == m)
+            return;
+    card->watched[card->watched_count++] = m;
+}
+
+void sim_pads_changed(struct sim_card *const card)
+{
+    card->pads_stale = true;
 }
 
 struct sim_module *sim_find(struct sim_card *const card, const uint8_t gtag)
@@ -285,6 +296,7 @@ static int build(struct sim_card *const card, const struct sim_card_options *con
     if (err)
         return err;
     claim_all_pages(card);
+    sim_pins_connect(card);
     for (unsigned io = 0; io < HM2_MAX_PINS; io++)
         card->pads[io].outside = SIM_PULLUP;
     power_up(card);

@@ -11,8 +11,9 @@ struct sim_profile;
 struct sim_lbp16;
 
 struct sim_pad {
-    enum sim_level outside; /* what the world does to it */
-    enum sim_level shown;   /* what the FPGA last saw there */
+    struct sim_module *alternate; /* makes the level of the secondary output; NULL when there is none */
+    enum sim_level outside;       /* what the world does to it */
+    enum sim_level shown;         /* what the FPGA last saw there */
 };
 
 struct sim_watch {
@@ -38,6 +39,8 @@ struct sim_card {
 
     unsigned module_count;
     struct sim_module modules[HM2_MAX_MODULES];
+    unsigned watched_count;
+    struct sim_module *watched[HM2_MAX_MODULES]; /* whose next_event() matters */
     struct sim_module *page_owner[SIM_PAGES];
     struct sim_module *ioport;
     bool pads_stale; /* port registers may have changed since the pads were looked at */
@@ -61,6 +64,7 @@ void sim_sync(struct sim_module *m); /* advance to the card's present clk */
 struct sim_module *sim_module_of(struct sim_card *card, uint8_t gtag);
 
 /* pins.c */
+void sim_pins_connect(struct sim_card *card); /* once, when all modules are there */
 void sim_pins_power_up(struct sim_card *card);
 void sim_pins_release(struct sim_card *card);
 /* Look at every watched output and every stale pad; changes are those of edge clk. */

@@ -29,20 +29,20 @@ static enum sim_level output_of(struct sim_module *const m, const unsigned unit,
     return m->ops->output(m, unit, secondary_pin);
 }
 
-/* The module that makes the level of a pad's secondary output, NULL when there is none. */
-static struct sim_module *alternate_source(struct sim_card *const card, const unsigned io)
+void sim_pins_connect(struct sim_card *const card)
 {
-    const struct hm2_pd *const pd = &card->idrom.pins[io];
-    if (io >= card->idrom.pin_count || pd->secondary_tag == HM2_GTAG_NONE || !(pd->secondary_pin & HM2_PIN_OUTPUT))
-        return NULL;
-    return sim_module_of(card, pd->secondary_tag);
+    for (unsigned io = 0; io < card->idrom.pin_count; io++) {
+        const struct hm2_pd *const pd = &card->idrom.pins[io];
+        const bool has_output = pd->secondary_tag != HM2_GTAG_NONE && (pd->secondary_pin & HM2_PIN_OUTPUT);
+        card->pads[io].alternate = has_output ? sim_module_of(card, pd->secondary_tag) : NULL;
+    }
 }
 
 enum sim_level sim_alternate(struct sim_card *const card, const unsigned io)
 {
     if (card->assuming && card->assumed_io == io)
         return card->assumed_level;
-    struct sim_module *const m = io < HM2_MAX_PINS ? alternate_source(card, io) : NULL;
+    struct sim_module *const m = io < HM2_MAX_PINS ? card->pads[io].alternate : NULL;
     const struct hm2_pd *const pd = &card->idrom.pins[m ? io : 0];
     return output_of(m, pd->secondary_unit, pd->secondary_pin);
 }
@@ -52,8 +52,13 @@ enum sim_level sim_pad_level(struct sim_card *const card, const unsigned io)
     if (io >= card->idrom.pin_count)
         return SIM_FLOAT;
     const enum sim_level driven = fpga_drives(card, io);
-    if (driven != SIM_FLOAT)
-        return driven;
+    return driven != SIM_FLOAT ? driven : sim_pad_outside(card, io);
+}
+
+enum sim_level sim_pad_outside(const struct sim_card *const card, const unsigned io)
+{
+    if (io >= card->idrom.pin_count)
+        return SIM_FLOAT;
     return card->pads[io].outside == SIM_PULLUP ? SIM_HIGH : card->pads[io].outside;
 }
 
@@ -199,7 +204,7 @@ static int64_t next_of_wires(struct sim_card *const card, int64_t until)
 {
     for (unsigned i = 0; i < card->wire_count; i++) {
         const unsigned io = card->wires[i].from;
-        struct sim_module *const m = alternate_source(card, io);
+        struct sim_module *const m = card->pads[io].alternate;
         if (!m || !m->ops->trace)
             continue;
         const struct hm2_pd *const pd = &card->idrom.pins[io];
@@ -211,10 +216,8 @@ static int64_t next_of_wires(struct sim_card *const card, int64_t until)
 
 int64_t sim_pins_next_event(struct sim_card *const card, int64_t until)
 {
-    for (unsigned i = 0; i < card->module_count; i++) {
-        struct sim_module *const m = &card->modules[i];
-        if (!m->watched)
-            continue;
+    for (unsigned i = 0; i < card->watched_count; i++) {
+        struct sim_module *const m = card->watched[i];
         sim_sync(m);
         if (!m->ops->next_event || m->ops->trace)
             continue;
@@ -273,7 +276,7 @@ static int add_watch(struct sim_card *const card, struct sim_watch watch)
         return HM2_ERR_NOMEM;
     card->watches = more;
     if (watch.module)
-        watch.module->watched = true;
+        sim_watch_module(watch.module);
     watch.level = level_of(card, &watch);
     more[card->watch_count] = watch;
     return (int)card->watch_count++;
@@ -286,7 +289,7 @@ int sim_card_watch_pad(struct sim_card *const card, const unsigned io)
     const struct hm2_pd *const pd = &card->idrom.pins[io];
     return add_watch(card, (struct sim_watch){.is_pad = true,
                                               .io = io,
-                                              .module = alternate_source(card, io),
+                                              .module = card->pads[io].alternate,
                                               .unit = pd->secondary_unit,
                                               .secondary_pin = pd->secondary_pin});
 }
@@ -338,9 +341,9 @@ int sim_card_wire(struct sim_card *const card, const unsigned from_io, const uns
         return HM2_ERR_NOMEM;
     card->wires = more;
     more[card->wire_count++] = (struct sim_wire){.from = from_io, .to = to_io};
-    struct sim_module *const source = alternate_source(card, from_io);
+    struct sim_module *const source = card->pads[from_io].alternate;
     if (source)
-        source->watched = true;
+        sim_watch_module(source);
     settle_wires(card);
     return 0;
 }

@@ -57,9 +57,7 @@ struct sim_module {
     struct sim_card *card;
     struct hm2_md md;
     void *state;
-    int64_t clk;  /* edges before this have been made */
-    bool watched; /* some output is watched or wired: next_event matters. A model whose events act on other modules
-                   * (watchdog) sets it in init; never cleared */
+    int64_t clk; /* edges before this have been made */
 };
 
 /* Every model, NULL-terminated; a new one is one line in lib/sim/models.c. */
@@ -77,10 +75,17 @@ int64_t sim_now(const struct sim_card *card);
 /* The watchdog bites now (called from its advance(), while it makes the edge at which the outputs go): every module's
  * bite() runs, and the pads are looked at again. next_event() must have announced that edge. */
 void sim_bite(struct sim_card *card);
+/* Some output of the module is watched or wired: from now on its next_event() matters. A model whose events act on
+ * other modules (watchdog) asks for it in init(). */
+void sim_watch_module(struct sim_module *m);
+/* A port register has another value than before: the pads are looked at again. Called by the IOPort model. */
+void sim_pads_changed(struct sim_card *card);
 /* Level of the secondary output behind a pad (SIM_LOW when it has none, or no model). */
 enum sim_level sim_alternate(struct sim_card *card, unsigned io);
 /* Level of a pad: driven by the FPGA, else by the world outside; SIM_FLOAT when nobody drives or pulls it. */
 enum sim_level sim_pad_level(struct sim_card *card, unsigned io);
+/* The same for a pad that the FPGA does not drive, for the IOPort model, which knows that. */
+enum sim_level sim_pad_outside(const struct sim_card *card, unsigned io);
 
 /* DPLL timers seen by other modules (0 = reference, 1..4): the last rising edge before clk and the first one at or
  * after clk; SIM_NEVER (or INT64_MIN) when there is none. Answered by the HM2DPLL model. */

@@ -55,7 +55,8 @@ static void run_counter(const struct encoder *const e, struct sim_qcounter *cons
     while (clk < to) {
         const int64_t tick = sim_divider_tick(&e->rate, clk);
         if (!sim_qcounter_busy(q, type)) {
-            if (sim_qcounter_settled(q, type) || tick >= to)
+            q->at_rest = sim_qcounter_settled(q, type);
+            if (q->at_rest || tick >= to)
                 return;
             clk = tick;
         }
@@ -67,7 +68,8 @@ static void run_counter(const struct encoder *const e, struct sim_qcounter *cons
 static void run(const struct encoder *const e, const int64_t from, const int64_t to)
 {
     for (unsigned i = 0; i < e->bank.count; i++)
-        run_counter(e, &e->bank.counters[i], from, to);
+        if (!e->bank.counters[i].at_rest)
+            run_counter(e, &e->bank.counters[i], from, to);
 }
 
 static void advance(struct sim_module *const m, const int64_t clk)
@@ -105,7 +107,7 @@ static void write(struct sim_module *const m, const unsigned page, const unsigne
         if (to_counter && i == low / 4)
             sim_qcounter_edge(q, &e->bank.type, clk, sim_divider_tick(&e->rate, clk) == clk,
                               sim_timestamp_at(&e->bank.stamps, clk), &access);
-        else
+        else if (!q->at_rest)
             run_counter(e, q, clk, clk + 1);
     }
     sim_qc_bank_write(&e->bank, clk, page, value);
@@ -116,6 +118,7 @@ static void write(struct sim_module *const m, const unsigned page, const unsigne
 
 static void set_pin(struct sim_qcounter *const q, const uint8_t pin, const bool level)
 {
+    q->at_rest = false;
     switch (pin) {
     case PIN_A:
     case PIN_B:

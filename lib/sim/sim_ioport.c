@@ -45,9 +45,11 @@ static unsigned port_of(const unsigned low)
 static uint32_t read_pads(struct sim_module *const m, const unsigned port, uint32_t *const undriven)
 {
     const struct ports *const s = m->state;
+    const uint32_t driven = s->reg[port][REG_DDR] | s->reg[port][REG_OPEN_DRAIN];
     uint32_t value = 0;
     for (unsigned bit = 0; bit < s->width; bit++) {
-        const enum sim_level level = sim_pad_level(m->card, port * s->width + bit);
+        const unsigned io = port * s->width + bit;
+        const enum sim_level level = driven >> bit & 1u ? sim_pad_level(m->card, io) : sim_pad_outside(m->card, io);
         if (level == SIM_FLOAT)
             *undriven |= UINT32_C(1) << bit;
         else if (level != SIM_LOW)
@@ -72,8 +74,10 @@ static void write_reg(struct sim_module *const m, const unsigned page, const uns
 {
     struct ports *const s = m->state;
     const unsigned port = port_of(low);
-    if (port < s->count && page < REGS)
-        s->reg[port][page] = value & s->mask;
+    if (port >= s->count || page >= REGS || s->reg[port][page] == (value & s->mask))
+        return;
+    s->reg[port][page] = value & s->mask;
+    sim_pads_changed(m->card);
 }
 
 /* What the card drives on a pad. Open drain wins over DDR; the inversion comes before both. */

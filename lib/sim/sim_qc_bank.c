@@ -213,7 +213,7 @@ static void follow(struct sim_qc_bank *const bank, const unsigned i, const int64
 
 void sim_qc_bank_follow(struct sim_module *const m, struct sim_qc_bank *const bank, const int64_t clk)
 {
-    for (unsigned i = 0; i < bank->count; i++)
+    for (unsigned i = 0; bank->following && i < bank->count; i++)
         if (bank->follows[i].position)
             follow(bank, i, bank->follows[i].position(m->card, bank->follows[i].unit), clk);
 }
@@ -230,7 +230,8 @@ static int start_following(struct sim_module *const m, const unsigned encoder, c
     bank->follows[encoder] = *what;
     bank->follows[encoder].seen = what->position(m->card, what->unit);
     bank->follows[encoder].seen_clk = m->clk;
-    m->watched = true; /* a DPLL timer that samples it must find it at the position of that moment */
+    bank->following = true;
+    sim_watch_module(m); /* a DPLL timer that samples it must find it at the position of that moment */
     return 0;
 }
 

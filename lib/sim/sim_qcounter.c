@@ -192,6 +192,7 @@ static void load_control(struct sim_qcounter *const q, const struct sim_qc_type 
 void sim_qcounter_edge(struct sim_qcounter *const q, const struct sim_qc_type *const type, const int64_t clk,
                        const bool tick, const uint16_t stamp, const struct sim_qc_access *const access)
 {
+    q->at_rest = false;
     q->before_data = sim_qcounter_data(q);
     q->before_control = sim_qcounter_control(q);
     q->last_edge = clk;

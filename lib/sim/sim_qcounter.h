@@ -74,6 +74,7 @@ struct sim_qcounter {
     bool sampled[SIM_QC_INPUTS], filtered[SIM_QC_INPUTS], first[SIM_QC_INPUTS], second[SIM_QC_INPUTS];
     uint8_t filter[SIM_QC_INPUTS];
     bool clearing;
+    bool at_rest; /* found neither busy nor unsettled, and no input and no register has changed since */
     uint16_t count, latch, stamp;
     uint16_t control;
 
@@ -124,6 +125,7 @@ struct sim_qc_bank {
     unsigned count;
     struct sim_qcounter *counters;
     struct sim_follow *follows;
+    bool following; /* some of them are active */
     struct sim_timestamp stamps;
     uint8_t select; /* register 5, bits 15..12 */
     uint16_t sampled_stamp;

@@ -109,7 +109,7 @@ static void write_reg(struct sim_module *const m, const unsigned page, const uns
 
 static int init(struct sim_module *const m)
 {
-    m->watched = true; /* its bite changes pads */
+    sim_watch_module(m); /* its bite changes pads */
     return 0;
 }
 

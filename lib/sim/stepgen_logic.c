@@ -218,6 +218,7 @@ static void edge_of_outputs(struct sim_stepgen *const g)
 
 void sim_stepgen_edge(struct sim_stepgen *const g, const bool tick, const struct sim_stepgen_write *const write)
 {
+    g->quiet = 0;
     const bool would_step = phase(g) + rate_size(g) >= ONE_STEP;
     const bool adds = tick && (!would_step || step_may_be_added(g));
     edge_of_outputs(g);
@@ -312,12 +313,13 @@ static void count_down(uint16_t *const count, const int64_t edges)
     *count = (uint16_t)(*count > edges ? *count - edges : 0);
 }
 
-/* Make `edges` >= 1 quiet edges. */
-static void leap(struct sim_stepgen *const g, const struct sim_rategen *const rategen, const int64_t edges,
-                 const int64_t adds)
+/* Make `edges` >= 1 quiet edges of the stretch. */
+static void leap(struct sim_stepgen *const g, const struct sim_rategen *const rategen, const int64_t edges)
 {
-    const int64_t before_last = smaller(sim_rategen_ticks(rategen, edges - 1), adds);
-    const int64_t all = smaller(sim_rategen_ticks(rategen, edges), adds);
+    const int64_t before_last = smaller(sim_rategen_ticks(rategen, edges - 1), g->adds);
+    const int64_t all = smaller(sim_rategen_ticks(rategen, edges), g->adds);
+    g->quiet -= edges;
+    g->adds -= all;
     if (before_last > 0)
         add(g, (uint64_t)before_last);
     g->old_msb = msb(g);
@@ -417,14 +419,16 @@ static int64_t skip_steps(struct sim_stepgen *const g, const struct sim_rategen 
 
 static int64_t run_some(struct sim_stepgen *const g, const struct sim_rategen *const rategen, const int64_t edges)
 {
-    const int64_t adds = adds_before_step(g);
-    const int64_t quiet = quiet_edges(g, rategen, adds);
-    if (quiet > 0) {
-        const int64_t done = smaller(quiet, edges);
-        leap(g, rategen, done, adds);
+    if (g->quiet == 0) {
+        g->adds = adds_before_step(g);
+        g->quiet = quiet_edges(g, rategen, g->adds);
+    }
+    if (g->quiet > 0) {
+        const int64_t done = smaller(g->quiet, edges);
+        leap(g, rategen, done);
         return done;
     }
-    if (adds == 0) {
+    if (g->adds == 0) {
         const int64_t done = skip_steps(g, rategen, edges);
         if (done > 0)
             return done;

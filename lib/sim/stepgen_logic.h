@@ -62,6 +62,9 @@ struct sim_stepgen {
     bool added_dir; /* direction of the last addition */
     bool dir, pulse;
     bool old_pulse_wait;
+    /* The stretch that sim_stepgen_run() is in: edges to come that only add and count down, and additions among them
+     * before the one that makes a step. 0 edges = not worked out; every single edge ends a stretch. */
+    int64_t quiet, adds;
     uint8_t table[16]; /* shift register, newest entry first */
     uint8_t table_ptr, table_max;
 };
