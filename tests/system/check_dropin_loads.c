@@ -100,6 +100,9 @@ static const struct line lines[] = {
     {"ssi-empty", "7i96s", "ssi_chan_0="},
     {"biss", "7i96s", "biss_chan_1=position%22e"},
     {"fanuc", "7i96s", "fanuc_chan_0=AA64"},
+    /* a card with nothing but ports */
+    {"ports", "7i80hd-16", ""},
+    {"ports-raw", "7i80hd-16", "enable_raw num_leds=0 num_encoders=8"},
     /* nothing */
     {"empty", "7i96s", ""},
     {"only-blanks", "7i96s", "   "},

@@ -326,6 +326,21 @@ static const struct event servo_events[] = {
     {100, 500, TURN, 7, -3, 0, 0}, {500, 1500, TURN, 6, 1, 0, 0},
 };
 
+/* ---- the same for a card with nothing but ports, whose pads are driven, too */
+
+static const struct setting ports_settings[] = {
+    {0, "watchdog.timeout_ns", 100000000},
+};
+
+static const struct wave ports_waves[] = {
+    {"led.CR03", WAVE_SQUARE, 0.5, 0.5, 100, 0, 1280},
+};
+
+static const struct event ports_events[] = {
+    {100, 0, PAD, 0, SIM_LOW, 0, 0},  {200, 0, PAD, 23, SIM_LOW, 0, 0}, {300, 0, PAD, 24, SIM_LOW, 0, 0},
+    {400, 0, PAD, 71, SIM_LOW, 0, 0}, {500, 0, PAD, 0, SIM_HIGH, 0, 0}, {600, 0, PAD, 71, SIM_HIGH, 0, 0},
+};
+
 /* ---- the first axis once more, slower, with a card whose processor takes its time */
 
 static const struct setting paced_settings[] = {
@@ -381,6 +396,7 @@ const struct scenario scenarios[] = {
              .reached = {{"encoder.03.count", 500}, {"encoder.06.count", 500}, {"stepgen.00.counts", 1000}}),
     SCENARIO(settings, "7i96s", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
     SCENARIO(settings, "7i93", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
+    SCENARIO(ports, "7i80hd-16", "", 1280, .settle = 64, .keeps = settings_keeps, .reached = {{"gpio.071.in", 1}}),
     SCENARIO(paced, "7i96s", "", 2000, .paced = true, .reached = {{"encoder.00.count", 15000}}),
 };
 const size_t scenario_count = COUNT(scenarios);
