@@ -75,17 +75,29 @@ static void say_state(const struct text *const text)
                                  board->modules[i].instances);
 }
 
+/* "hm2_7i96s.0.inm.00.scan_rate" */
+static void put_subject(char *const name, const size_t size, const char *const prefix,
+                        const struct board_event *const event)
+{
+    char instance[16] = "";
+    if (event->instance != HM2_NO_INSTANCE)
+        (void)snprintf(instance, sizeof instance, ".%02u", event->instance);
+    (void)snprintf(name, size, "%s.%s%s%s%s", prefix, event->module->type->name, instance, event->point ? "." : "",
+                   event->point ? event->point : "");
+}
+
 static bool say_notice(const struct text *const text, const struct board_event *const event)
 {
     const struct notice_text *const row =
         &notice_texts[(unsigned)event->kind < HM2_NOTICES ? event->kind : HM2_NOTICE_VALUE_INVALID];
+    char subject[HM2_NAME_SIZE];
+    put_subject(subject, sizeof subject, text->board->prefix, event);
     if (event->kind == HM2_NOTICE_WATCHDOG_BIT)
         say_bite(text, event);
     else if (event->kind == HM2_NOTICE_DUMP_STATE)
         say_state(text);
     else
-        SAY(text, "%s.%s.%02u: %s%.9g%s", text->board->prefix, event->module->type->name, event->instance, row->before,
-            event->value, row->after);
+        SAY(text, "%s: %s%.9g%s", subject, row->before, event->value, row->after);
     return row->error;
 }
 

@@ -25,19 +25,21 @@ bool board_notices_pop(struct board_notices *const notices, struct board_event *
     return true;
 }
 
-static unsigned hash(const struct hm2_module *const module, const int kind, const unsigned instance)
+static unsigned hash(const struct hm2_module *const module, const int kind, const char *const point,
+                     const unsigned instance)
 {
-    const uintptr_t mixed = ((uintptr_t)module >> 4) + (uintptr_t)(unsigned)kind * 7u + (uintptr_t)instance * 31u;
+    const uintptr_t mixed =
+        ((uintptr_t)module >> 4) + (uintptr_t)point + (uintptr_t)(unsigned)kind * 7u + (uintptr_t)instance * 31u;
     return (unsigned)(mixed % (NOTICE_ACTIVE_SIZE / NOTICE_ACTIVE_WAYS)) * NOTICE_ACTIVE_WAYS;
 }
 
 bool board_notices_is_new(struct board_notices *const notices, const struct hm2_module *const module, const int kind,
-                          const unsigned instance)
+                          const char *const point, const unsigned instance)
 {
-    struct notice_active *const set = notices->active + hash(module, kind, instance);
+    struct notice_active *const set = notices->active + hash(module, kind, point, instance);
     struct notice_active *place = set;
     for (unsigned i = 0; i < NOTICE_ACTIVE_WAYS; i++) {
-        if (set[i].module == module && set[i].kind == kind && set[i].instance == instance) {
+        if (set[i].module == module && set[i].kind == kind && set[i].point == point && set[i].instance == instance) {
             const bool absent = notices->now_ns - set[i].last_ns > NOTICE_ABSENT_NS;
             set[i].last_ns = notices->now_ns;
             return absent;
@@ -45,7 +47,7 @@ bool board_notices_is_new(struct board_notices *const notices, const struct hm2_
         if (place->module && (!set[i].module || set[i].last_ns < place->last_ns))
             place = set + i;
     }
-    *place = (struct notice_active){module, kind, instance, notices->now_ns};
+    *place = (struct notice_active){module, kind, point, instance, notices->now_ns};
     return true;
 }
 
@@ -57,14 +59,21 @@ static uint32_t microseconds(const int64_t ns)
 void hm2_notice(const struct hm2_module *const module, const enum hm2_notice notice, const unsigned instance,
                 const double value)
 {
+    hm2_notice_point(module, notice, NULL, instance, value);
+}
+
+void hm2_notice_point(const struct hm2_module *const module, const enum hm2_notice notice, const char *const point,
+                      const unsigned instance, const double value)
+{
     if (module->noticed)
         module->noticed[notice]++;
     if (!module->board)
         return;
     struct hm2_board *const board = module->board;
-    if (!board_notices_is_new(&board->notices, module, (int)notice, instance))
+    if (!board_notices_is_new(&board->notices, module, (int)notice, point, instance))
         return;
-    struct board_event event = {.module = module, .kind = (int)notice, .instance = instance, .value = value};
+    struct board_event event = {
+        .module = module, .kind = (int)notice, .point = point, .instance = instance, .value = value};
     if (notice == HM2_NOTICE_WATCHDOG_BIT) {
         event.words[BOARD_BITE_REASON] = board_bite_reason(board);
         event.words[BOARD_BITE_GAP_US] = microseconds(board_write_gap_ns(board));

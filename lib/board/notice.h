@@ -20,6 +20,7 @@
 struct board_event {
     const struct hm2_module *module; /* NULL: an event of the board itself */
     int kind;                        /* enum hm2_notice, or enum board_event_kind when module is NULL */
+    const char *point;               /* that it is about, or NULL */
     unsigned instance;
     double value;
     uint32_t words[NOTICE_WORDS]; /* facts that belong to the kind */
@@ -28,6 +29,7 @@ struct board_event {
 struct notice_active {
     const struct hm2_module *module; /* NULL = free */
     int kind;
+    const char *point; /* by address: every place of the code names its own constant */
     unsigned instance;
     int64_t last_ns;
 };
@@ -46,6 +48,7 @@ bool board_notices_push(struct board_notices *notices, const struct board_event 
 /* Consumer: take the oldest event. */
 bool board_notices_pop(struct board_notices *notices, struct board_event *event);
 /* Producer: is this condition new at notices->now_ns? Remembers it as present either way. */
-bool board_notices_is_new(struct board_notices *notices, const struct hm2_module *module, int kind, unsigned instance);
+bool board_notices_is_new(struct board_notices *notices, const struct hm2_module *module, int kind, const char *point,
+                          unsigned instance);
 
 #endif

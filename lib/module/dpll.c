@@ -115,7 +115,7 @@ static uint32_t limited(const struct hm2_module *const module, const uint32_t va
 {
     if (value <= limit)
         return value;
-    hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, 0, value);
+    hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "plimit", HM2_NO_INSTANCE, value);
     return limit;
 }
 
@@ -128,7 +128,7 @@ static double loop_khz(const struct hm2_module *const module, const struct hm2_c
     const double khz = *ctx->base_freq_khz;
     if (khz > 0.0 && khz <= 1e9)
         return khz;
-    hm2_notice(module, HM2_NOTICE_VALUE_INVALID, 0, khz);
+    hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, "base-freq-khz", HM2_NO_INSTANCE, khz);
     return from_period;
 }
 
@@ -169,7 +169,7 @@ static uint32_t timer_value(const struct hm2_module *const module, const unsigne
     const double offset_us = *ctx->timer[number].offset_us;
     ctx->timer[number].for_us = isfinite(offset_us) ? offset_us : NAN;
     if (!isfinite(offset_us)) {
-        hm2_notice(module, HM2_NOTICE_VALUE_INVALID, number, offset_us);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, "timer-us", number + 1, offset_us);
         return 0;
     }
     return (uint32_t)hm2_trunc_s32(-offset_us * per_us) & 0xFFFFu;

@@ -51,7 +51,7 @@ static void take_scale(struct encoder *const enc)
 {
     double scale = *enc->scale;
     if (!isfinite(scale) || scale == 0.0 || !isfinite(1.0 / scale)) {
-        hm2_notice(enc->module, HM2_NOTICE_VALUE_INVALID, enc->number, scale);
+        hm2_notice_point(enc->module, HM2_NOTICE_VALUE_INVALID, "scale", enc->number, scale);
         *enc->scale = scale = 1.0;
     }
     enc->scale_seen = scale;
@@ -63,7 +63,7 @@ static double usable_timeout(const struct encoder *const enc)
     const double timeout_s = *enc->vel_timeout;
     if (timeout_s == timeout_s)
         return timeout_s;
-    hm2_notice(enc->module, HM2_NOTICE_VALUE_INVALID, enc->number, timeout_s);
+    hm2_notice_point(enc->module, HM2_NOTICE_VALUE_INVALID, "vel-timeout", enc->number, timeout_s);
     return *enc->vel_timeout = VEL_TIMEOUT;
 }
 

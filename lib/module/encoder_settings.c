@@ -54,7 +54,8 @@ HM2_RARE static void pack_filter(struct encoder_module *const ctx, const struct 
         return;
     uint32_t word = encoder_filter_rate(ctx->clock_hz, wanted_hz, &ctx->sample_frequency_seen);
     if (wanted_hz == 0)
-        hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, 0, 0.0);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, ctx->muxed ? "muxed-sample-frequency" : "sample-frequency",
+                         HM2_NO_INSTANCE, 0.0);
     *ctx->sample_frequency = ctx->sample_frequency_seen;
     if (ctx->skew_ns) {
         word |= encoder_skew(ctx->clock_hz, wanted_ns, &ctx->skew_seen_ns) << SKEW_SHIFT;

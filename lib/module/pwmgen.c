@@ -148,7 +148,7 @@ HM2_RARE static void take_mode(struct pwmgen *const gen, const struct hm2_module
     struct pwmgen_module *const ctx = module->context;
     int32_t type = *gen->output_type;
     if (type < PWMGEN_PWM_DIR || type > PWMGEN_DIR_PWM) {
-        hm2_notice(module, HM2_NOTICE_VALUE_INVALID, number, type);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, "output-type", number, type);
         *gen->output_type = type = PWMGEN_PWM_DIR;
     }
     gen->type_seen = type;
@@ -177,9 +177,9 @@ static void take_frequencies(struct hm2_module *const module)
     const struct pwmgen_rate pwm = pwmgen_pwm_rate(module->md->clock_hz, *ctx->pwm_frequency);
     const struct pwmgen_rate pdm = pwmgen_pdm_rate(module->md->clock_hz, *ctx->pdm_frequency);
     if (pwm.clamped)
-        hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, 0, *ctx->pwm_frequency);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "pwm_frequency", HM2_NO_INSTANCE, *ctx->pwm_frequency);
     if (pdm.clamped)
-        hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, 0, *ctx->pdm_frequency);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "pdm_frequency", HM2_NO_INSTANCE, *ctx->pdm_frequency);
     *ctx->pwm_frequency = ctx->pwm_seen_hz = pwm.frequency_hz;
     *ctx->pdm_frequency = ctx->pdm_seen_hz = pdm.frequency_hz;
     hm2_section_set(&ctx->pwm_rate, 0, pwm.dds);
@@ -219,7 +219,7 @@ static double duty(struct pwmgen *const gen, const struct hm2_module *const modu
     if (!(*gen->scale == gen->scale_seen)) {
         double scale = *gen->scale;
         if (!isfinite(scale) || scale == 0.0) {
-            hm2_notice(module, HM2_NOTICE_VALUE_INVALID, number, scale);
+            hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, "scale", number, scale);
             *gen->scale = scale = 1.0;
         }
         gen->scale_seen = scale;
@@ -229,7 +229,7 @@ static double duty(struct pwmgen *const gen, const struct hm2_module *const modu
     /* A true division: the register truncates, and the product with a reciprocal misses full scale by one step. */
     const double wanted = value / gen->scale_seen;
     if (!isfinite(value)) {
-        hm2_notice(module, HM2_NOTICE_VALUE_INVALID, number, value);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, "value", number, value);
         return 0.0;
     }
     return wanted > 1.0 ? 1.0 : wanted < -1.0 ? -1.0 : wanted;

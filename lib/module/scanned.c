@@ -86,14 +86,14 @@ enum { GROUP_MODULE, GROUP_FILTERED, GROUP_RAW, GROUP_SLOW, GROUP_COUNTER };
 /* ---- parameters ------------------------------------------------------------------------------------------------- */
 
 /* Bring a parameter into its limits and show what is really used. */
-static uint32_t limit(const struct hm2_module *const module, hm2_u32_t *const parameter, const uint32_t lowest,
-                      const uint32_t highest, const unsigned unit)
+static uint32_t limit(const struct hm2_module *const module, hm2_u32_t *const parameter, const char *const name,
+                      const uint32_t lowest, const uint32_t highest, const unsigned unit)
 {
     const uint32_t wanted = *parameter;
     const uint32_t used = wanted < lowest ? lowest : wanted > highest ? highest : wanted;
     if (used != wanted) {
         *parameter = used;
-        hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, unit, wanted);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, name, unit, wanted);
     }
     return used;
 }
@@ -106,9 +106,10 @@ static uint32_t control_word(const struct hm2_module *const module, const unsign
     const uint32_t clocks_per_scan = CLOCKS_PER_STEP * instance->width; /* 4..128 */
     const uint32_t whole_hz = ctx->clock_hz / (clocks_per_scan * (DIVISOR_MAX + 1u));
     const uint32_t slowest = whole_hz > 0 ? whole_hz : 1u;
-    instance->for_rate = limit(module, instance->scan_rate, slowest, ctx->max_bits_per_s / instance->width, unit);
-    instance->for_fast = limit(module, instance->fast_scans, 1, FAST_MAX, unit);
-    instance->for_slow = limit(module, instance->slow_scans, 1, SLOW_MAX, unit);
+    instance->for_rate =
+        limit(module, instance->scan_rate, "scan_rate", slowest, ctx->max_bits_per_s / instance->width, unit);
+    instance->for_fast = limit(module, instance->fast_scans, "fast_scans", 1, FAST_MAX, unit);
+    instance->for_slow = limit(module, instance->slow_scans, "slow_scans", 1, SLOW_MAX, unit);
     const uint64_t clocks = (uint64_t)clocks_per_scan * instance->for_rate; /* the rate is at least 1 */
     const uint32_t divisor = (uint32_t)(ctx->clock_hz / clocks);
     const uint32_t field = divisor == 0 ? 0 : divisor - 1u > DIVISOR_MAX ? DIVISOR_MAX : divisor - 1u;

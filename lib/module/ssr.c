@@ -95,7 +95,7 @@ static void set_rate(const struct hm2_module *const module, struct ssr *const ss
         rate_hz = RATE_MAX_HZ;
     /* The pin stays as it is, as with LinuxCNC's driver: it may show a signal that others read. */
     if (rate_hz != wanted_hz)
-        hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, (unsigned)(ssr - ctx->ssr), wanted_hz);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "rate", (unsigned)(ssr - ctx->ssr), wanted_hz);
     ssr->register_for_hz = wanted_hz;
     hm2_section_set(&ssr->rate_section, 0, rate_value(ctx->clock_hz, rate_hz));
 }

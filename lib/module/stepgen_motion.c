@@ -12,10 +12,10 @@
 #define TWO_TO_32      4294967296.0
 #define HEADROOM       1.001 /* a command this much faster than the limit is told to a person */
 
-static double report(const struct stepgen *const gen, const enum hm2_notice notice, const double found,
-                     const double used)
+static double report(const struct stepgen *const gen, const enum hm2_notice notice, const char *const point,
+                     const double found, const double used)
 {
-    hm2_notice(gen->module, notice, gen->number, found);
+    hm2_notice_point(gen->module, notice, point, gen->number, found);
     return used;
 }
 
@@ -23,19 +23,20 @@ static void take_scale(struct stepgen *const gen)
 {
     double scale = *gen->position_scale;
     if (!isfinite(scale))
-        scale = report(gen, HM2_NOTICE_VALUE_INVALID, scale, 1.0);
+        scale = report(gen, HM2_NOTICE_VALUE_INVALID, "position-scale", scale, 1.0);
     else if (fabs(scale) < SMALLEST_SCALE)
-        scale = report(gen, HM2_NOTICE_VALUE_CLAMPED, scale, signbit(scale) ? -1.0 : 1.0);
+        scale = report(gen, HM2_NOTICE_VALUE_CLAMPED, "position-scale", scale, signbit(scale) ? -1.0 : 1.0);
     *gen->position_scale = scale;
     gen->scale = scale;
 }
 
 /* A limit that must be finite and not negative; 0 = none. */
-static double usable_limit(const struct stepgen *const gen, const double value, const double fallback)
+static double usable_limit(const struct stepgen *const gen, const char *const point, const double value,
+                           const double fallback)
 {
     if (!isfinite(value))
-        return report(gen, HM2_NOTICE_VALUE_INVALID, value, fallback);
-    return value < 0.0 ? report(gen, HM2_NOTICE_VALUE_CLAMPED, value, -value) : value;
+        return report(gen, HM2_NOTICE_VALUE_INVALID, point, value, fallback);
+    return value < 0.0 ? report(gen, HM2_NOTICE_VALUE_CLAMPED, point, value, -value) : value;
 }
 
 void stepgen_take_limits(struct stepgen *const gen)
@@ -48,11 +49,11 @@ void stepgen_take_limits(struct stepgen *const gen)
     const double pulse_ns = (double)len_ns + (double)space_ns;
     const double step_hz = pulse_ns > 0.0 ? fmin(1e9 / pulse_ns, ctx->max_step_hz) : ctx->max_step_hz;
     const double fastest = step_hz / fabs(gen->scale);
-    double maxvel = usable_limit(gen, *gen->maxvel, 0.0);
+    double maxvel = usable_limit(gen, "maxvel", *gen->maxvel, 0.0);
     if (maxvel > fastest)
-        maxvel = report(gen, HM2_NOTICE_VALUE_CLAMPED, maxvel, fastest);
+        maxvel = report(gen, HM2_NOTICE_VALUE_CLAMPED, "maxvel", maxvel, fastest);
     /* Not a number is no reason to accelerate without limit: the default is the safe side. */
-    const double accel = usable_limit(gen, *gen->maxaccel, 1.0);
+    const double accel = usable_limit(gen, "maxaccel", *gen->maxaccel, 1.0);
 
     *gen->maxvel = maxvel;
     *gen->maxaccel = accel;
@@ -71,11 +72,12 @@ static double clamp(const double value, const double low, const double high)
 }
 
 /* A command pin as a number, or what to use instead of NaN and infinities. */
-static double usable_command(const struct stepgen *const gen, const double command, const double fallback)
+static double usable_command(const struct stepgen *const gen, const char *const point, const double command,
+                             const double fallback)
 {
     if (fabs(command) <= DBL_MAX)
         return command;
-    return report(gen, HM2_NOTICE_VALUE_INVALID, command, fallback);
+    return report(gen, HM2_NOTICE_VALUE_INVALID, point, command, fallback);
 }
 
 /* Acceleration that brings the velocity to the command's, and the time it needs. Without a limit the original
@@ -132,14 +134,14 @@ static double next_velocity(struct stepgen *const gen, const double period_s, co
 {
     double velocity;
     if (*gen->control_type) {
-        velocity = usable_command(gen, *gen->velocity_cmd, 0.0);
+        velocity = usable_command(gen, "velocity-cmd", *gen->velocity_cmd, 0.0);
         if (gen->accel > 0.0) {
             const double step = gen->accel * period_s;
             velocity = clamp(velocity, gen->velocity - step, gen->velocity + step);
         }
         gen->old_cmd = hm2_finite_or(*gen->position_cmd, gen->old_cmd);
     } else {
-        const double command = usable_command(gen, *gen->position_cmd, gen->old_cmd);
+        const double command = usable_command(gen, "position-cmd", *gen->position_cmd, gen->old_cmd);
         velocity = follow(gen, command, period_s, per_second);
     }
     if (fabs(velocity) <= gen->limit)

@@ -80,13 +80,17 @@ int stepgen_add_settings(struct hm2_module *const module, struct hm2_setup *cons
 
 static void take_times(struct stepgen *const gen, struct stepgen_module *const ctx)
 {
+    static const char *const names[STEPGEN_TIMES] = {[STEPGEN_STEPLEN] = "steplen",
+                                                     [STEPGEN_STEPSPACE] = "stepspace",
+                                                     [STEPGEN_DIRSETUP] = "dirsetup",
+                                                     [STEPGEN_DIRHOLD] = "dirhold"};
     const struct hm2_module *const module = gen->module;
     const uint32_t longest_ns = stepgen_longest_ns(module->md->clock_hz);
     for (unsigned t = 0; t < STEPGEN_TIMES; t++) {
         uint32_t time_ns = *gen->time_ns[t];
         uint32_t clocks = stepgen_clocks(time_ns, module->md->clock_hz);
         if (clocks == TIME_MAX && time_ns > longest_ns) {
-            hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, gen->number, time_ns);
+            hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, names[t], gen->number, time_ns);
             *gen->time_ns[t] = time_ns = longest_ns;
         }
         if (t == STEPGEN_STEPLEN && clocks < STEPLEN_MIN)
@@ -124,7 +128,7 @@ static uint32_t type_bits(struct stepgen *const gen)
 {
     uint32_t type = *gen->step_type;
     if (type > STEPGEN_TABLE_ENTRIES) {
-        hm2_notice(gen->module, HM2_NOTICE_TABLE_TOO_LONG, gen->number, type);
+        hm2_notice_point(gen->module, HM2_NOTICE_TABLE_TOO_LONG, "step_type", gen->number, type);
         *gen->step_type = type = 0;
     }
     if (type < MODE_TABLE) {

@@ -47,7 +47,7 @@ void hm2_timer_pack(struct hm2_timer *const timer, const struct hm2_module *cons
     if (!timer->number || *timer->number == timer->seen)
         return;
     if (!valid(*timer->number)) {
-        hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, 0, *timer->number);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "timer-number", HM2_NO_INSTANCE, *timer->number);
         *timer->number = 0;
     }
     timer->seen = *timer->number;

@@ -112,12 +112,12 @@ HM2_RARE static void set_timer(const struct hm2_module *const module, const stru
         /* Only a clock above 500 MHz gets here, so the longest time fits 32 bits. */
         ctx->timer_for_ns = (uint32_t)(((uint64_t)TIMER_MAX + 1u) * NS_PER_S / ctx->clock_hz);
         *ctx->timeout_ns = ctx->timer_for_ns;
-        hm2_notice(module, HM2_NOTICE_VALUE_CLAMPED, 0, timeout_ns);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "timeout_ns", HM2_NO_INSTANCE, timeout_ns);
     }
     const uint64_t value = clocks == 0 ? 0 : clocks - 1;
     hm2_section_set(&ctx->timer, 0, value > TIMER_MAX ? TIMER_MAX : (uint32_t)value);
     if (2.0 * ctx->timer_for_ns < 3.0 * (double)cycle->period_ns)
-        hm2_notice(module, HM2_NOTICE_TIMEOUT_SHORT, 0, ctx->timer_for_ns);
+        hm2_notice_point(module, HM2_NOTICE_TIMEOUT_SHORT, "timeout_ns", HM2_NO_INSTANCE, ctx->timer_for_ns);
 }
 
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)

@@ -1136,6 +1136,10 @@ static void conditions_of_modules_become_sentences(void **state)
     const struct hm2_module *const stepgen = module_of(f, "stepgen");
     hm2_notice(stepgen, HM2_NOTICE_VALUE_CLAMPED, 3, 2.5);
     assert_true(message(f, PREFIX ".stepgen.03: the value 2.5 is out of range", true));
+    hm2_notice_point(stepgen, HM2_NOTICE_VALUE_CLAMPED, "maxvel", 3, 2.5);
+    assert_true(message(f, PREFIX ".stepgen.03.maxvel: the value 2.5 is out of range", true));
+    hm2_notice_point(stepgen, HM2_NOTICE_VALUE_CLAMPED, "timer-number", HM2_NO_INSTANCE, 9);
+    assert_true(message(f, PREFIX ".stepgen.timer-number: the value 9 is out of range", true));
     hm2_notice(stepgen, HM2_NOTICE_HEADROOM, 1, 100.0);
     assert_true(message(f, PREFIX ".stepgen.01: the command asks for 100, which maxvel or maxaccel", false));
     hm2_notice(stepgen, HM2_NOTICE_DUMP_STATE, 0, 0);

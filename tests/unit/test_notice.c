@@ -70,10 +70,11 @@ static void different_conditions_are_reported_each(void **state)
     hm2_notice(&f->module, HM2_NOTICE_VALUE_CLAMPED, 1, 0);
     hm2_notice(&f->module, HM2_NOTICE_VALUE_INVALID, 0, 0);
     hm2_notice(&other, HM2_NOTICE_VALUE_CLAMPED, 0, 0);
+    hm2_notice_point(&f->module, HM2_NOTICE_VALUE_CLAMPED, "scale", 0, 0);
     unsigned count = 0;
     while (board_notices_pop(&f->board->notices, &event))
         count++;
-    assert_int_equal(count, 4);
+    assert_int_equal(count, 5);
     hm2_board_free(f->board);
     free(f);
 }

@@ -10,6 +10,7 @@
 #ifndef HM2_MODULE_H
 #define HM2_MODULE_H
 
+#include <limits.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -125,6 +126,11 @@ struct hm2_module {
  * queue when it is new (again after it has been absent for about a second). instance and value go into the message.
  * Without a board only the counters move, so a module can be tested alone. Realtime safe. */
 HM2_API void hm2_notice(const struct hm2_module *module, enum hm2_notice notice, unsigned instance, double value);
+/* The same about one point, named as it is below its instance ("scan_rate", a constant); each point of an instance is
+ * told for itself. HM2_NO_INSTANCE: a point of the module. */
+#define HM2_NO_INSTANCE UINT_MAX
+HM2_API void hm2_notice_point(const struct hm2_module *module, enum hm2_notice notice, const char *point,
+                              unsigned instance, double value);
 
 /* Claim every pin whose secondary tag is gtag (HM2_GTAG_NONE: the module's own) and whose unit is below units; global
  * pins are claimed when units > 0. filter may be NULL; it may refuse single pins. Already claimed pins are a violation:
