@@ -195,7 +195,7 @@ static const struct setting bite_settings[] = {
 };
 
 static const struct wave bite_waves[] = {
-    {"stepgen.00.position-cmd", WAVE_SINE, 5, 0, 400, 0, 900},
+    {"stepgen.00.position-cmd", WAVE_SINE, 2, 0, 400, 0, 1500},
 };
 
 static const struct event bite_events[] = {
@@ -224,12 +224,13 @@ static const struct setting loss_settings[] = {
     {900, "packet-error-limit", 4},
     {900, "packet-error-increment", 3},
     {960, "io_error", 0},
+    {980, "watchdog.has_bit", 0},
 };
 
 static const struct wave loss_waves[] = {
-    {"stepgen.00.position-cmd", WAVE_SINE, 5, 0, 400, 0, 1100},
-    {"pwmgen.00.value", WAVE_TRIANGLE, 1, 0, 100, 0, 1100},
-    {"gpio.034.out", WAVE_SQUARE, 0.5, 0.5, 22, 0, 1100},
+    {"stepgen.00.position-cmd", WAVE_SINE, 2, 0, 400, 0, 1600},
+    {"pwmgen.00.value", WAVE_TRIANGLE, 1, 0, 100, 0, 1600},
+    {"gpio.034.out", WAVE_SQUARE, 0.5, 0.5, 22, 0, 1600},
 };
 
 static const struct event loss_events[] = {
@@ -389,8 +390,8 @@ const struct scenario scenarios[] = {
     SCENARIO(encoder, "7i96s", "", 1800, .reached = {{"encoder.00.index-enable", 1}, {"encoder.00.velocity", 100}}),
     SCENARIO(io, "7i96s", "enable_raw num_stepgens=1", 800,
              .reached = {{"inm.00.enc0-count", 1}, {"gpio.037.in_not", 1}}),
-    SCENARIO(bite, "7i96s", "", 900, .reached = {{"watchdog.has_bit", 1}}),
-    SCENARIO(loss, "7i96s", "", 1100, .reached = {{"io_error", 1}, {"watchdog.has_bit", 1}, {"packet-error-total", 5}}),
+    SCENARIO(bite, "7i96s", "", 1500, .reached = {{"watchdog.has_bit", 1}}),
+    SCENARIO(loss, "7i96s", "", 1600, .reached = {{"io_error", 1}, {"watchdog.has_bit", 1}, {"packet-error-total", 5}}),
     SCENARIO(dpll, "7i96s", "", 800, .reached = {{"dpll.ddsize", 1}, {"encoder.00.count", 5000}}),
     SCENARIO(servo, "7i93", "num_encoders=8 num_pwmgens=8 num_stepgens=4", 1500,
              .reached = {{"encoder.03.count", 500}, {"encoder.06.count", 500}, {"stepgen.00.counts", 1000}}),
