@@ -253,32 +253,46 @@ static void stop_messenger(void)
     messenger_runs = false;
 }
 
+/* ---- texts of several lines ----
+ * motmod, once loaded, takes the formats of error messages apart itself and knows no '*': it would take the length in
+ * "%.*s" for the string. */
+
+#define MAX_LINE 1000
+
+/* Copy the next line of a text without its end, cut when it is very long; false at the end of the text. */
+static bool next_line(const char **const text, char line[const MAX_LINE])
+{
+    const size_t len = strcspn(*text, "\n");
+    if (**text == '\0')
+        return false;
+    rtapi_snprintf(line, MAX_LINE, "%.*s", (int)len, *text);
+    *text += len + ((*text)[len] == '\n');
+    return true;
+}
+
 /* ---- load and unload --------------------------------------------------------------------------------------------- */
 
 /* Warnings too at the level that hosts print by default: whoever loads a card shall see them. */
 static void print_diag(const char *const address, const struct hm2_diag *const diag)
 {
-    const char *line = diag->text;
-    while (*line) {
-        const size_t len = strcspn(line, "\n");
-        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: %.*s\n", address, (int)len, line);
-        line += len + (line[len] == '\n');
-    }
+    const char *text = diag->text;
+    char line[MAX_LINE];
+    while (next_line(&text, line))
+        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: %s\n", address, line);
 }
 
 static void print_listing(const struct card *const card)
 {
     static char text[16384];
+    const char *rest = text;
+    char line[MAX_LINE];
     const struct hm2_plan_sizes sizes = hm2_board_sizes(card->board);
     hm2_board_describe_pins(card->board, text, sizeof text);
     rtapi_print("%s: payload of a cycle: request %u, reply %u, write %u bytes; set-up up to %u bytes in %u sections\n",
                 hm2_board_prefix(card->board), (unsigned)sizes.request_bytes, (unsigned)sizes.reply_bytes,
                 (unsigned)sizes.write_bytes, (unsigned)sizes.setup_bytes, sizes.sections);
-    for (const char *line = text; *line;) {
-        const size_t len = strcspn(line, "\n");
-        rtapi_print("%.*s\n", (int)len, line);
-        line += len + (line[len] == '\n');
-    }
+    while (next_line(&rest, line))
+        rtapi_print("%s\n", line);
 }
 
 /* Cards are numbered by the name in their prefix, which different types may share (7I80DB and 7I80HD). */

@@ -143,7 +143,7 @@ static int take_memory(void)
     const size_t row_bytes = (size_t)(pins + 1) * sizeof *rows;
     rows = calloc((size_t)depth, row_bytes);
     if (!rows) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "recorder: no memory for depth=%d cycles of %zu bytes\n", depth, row_bytes);
+        rtapi_print_msg(RTAPI_MSG_ERR, "recorder: no memory for depth=%d cycles of %d bytes\n", depth, (int)row_bytes);
         return -ENOMEM;
     }
     volatile double *const touched = rows;
