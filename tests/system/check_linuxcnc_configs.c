@@ -28,11 +28,14 @@ struct config {
     double accuracy;               /* of feedback and axes' position, in units */
     const char *registers[JOINTS]; /* where the card counts steps, or NULL: encoders turn with motors */
     double scale[JOINTS];          /* steps or counts a unit */
-    /* Motors: where the axis is in counts from power-up when its position is 0, and how exactly homing finds that. */
+    /* Where the axis is in steps or counts from power-up when its position is 0, and how exactly homing finds that. */
     double zero[JOINTS], exactness[JOINTS];
 };
 
-#define LATENESS_COUNTS 200 /* at the sample's latch velocity of 8192 counts a second: 24 ms without a servo cycle */
+/* What an axis moves at its latch velocity while 24 ms pass without a servo cycle. */
+#define SAMPLE_LATE 200 /* 0.1 inch/s */
+#define WIZARD_LATE 24  /* 1 mm/s, 1000 counts/mm */
+#define STEPS_LATE  6   /* 1 mm/s, 200 steps/mm, and the filter of the input */
 
 static const struct config configs[] = {
     {.name = "hm2-stepper",
@@ -41,7 +44,8 @@ static const struct config configs[] = {
      .feedback = "stepgen.%02u.position-fb",
      .accuracy = 0.001,
      .registers = {"0x2100", "0x2104", "0x2108"},
-     .scale = {1000, 1000, 1000}},
+     .scale = {1000, 1000, 1000},
+     .exactness = {1, 1, 1}},
     {.name = "hm2-servo",
      .prefix = "hm2_7i93.0",
      .end = {0.75, 0.3125, 0.5},
@@ -49,7 +53,22 @@ static const struct config configs[] = {
      .scale = {81920, -81920, 81920},
      /* HOME_OFFSET is -2.9 at the switch, or at the index behind it. */
      .zero = {-41943 + 2.9 * 81920, 5 * 8192 - 2.9 * 81920, -41943 + 2.9 * 81920},
-     .exactness = {LATENESS_COUNTS, 3, LATENESS_COUNTS}},
+     .exactness = {SAMPLE_LATE, 3, SAMPLE_LATE}},
+    {.name = "pncconf-7i96s",
+     .prefix = "hm2_7i96s.0",
+     .end = {12.5, 7.25, -3},
+     .accuracy = 0.01,
+     .registers = {"0x2100", "0x2104", "0x2108"},
+     .scale = {200, 200, 200},
+     .zero = {-200 + 2 * 200, -200 + 2 * 200, 200 - 2 * 200}, /* HOME_OFFSET is -2 mm, and 2 for Z, at the switch */
+     .exactness = {STEPS_LATE, STEPS_LATE, STEPS_LATE}},
+    {.name = "pncconf-7i93",
+     .prefix = "hm2_7i93.0",
+     .end = {12.5, 7.25, -3},
+     .accuracy = 0.005,
+     .scale = {1000, 1000, 1000},
+     .zero = {-1000 + 2 * 1000, 0 + 2 * 1000, 1000 - 2 * 1000}, /* the index behind Y's switch is at 0 */
+     .exactness = {WIZARD_LATE, 3, WIZARD_LATE}},
 };
 
 static struct process run;
@@ -166,8 +185,9 @@ static void check_steps(const struct config *const config)
         char start[64];
         snprintf(start, sizeof start, "register %s ", config->registers[i]);
         const double steps = (int32_t)(uint32_t)strtoul(said(start), NULL, 16) / PARTS_OF_A_STEP;
-        if (fabs(steps - config->end[i] * config->scale[i]) > 1)
-            ck_abort_msg("step generator %u made %.3f steps, not %.3f", i, steps, config->end[i] * config->scale[i]);
+        const double expected = config->zero[i] + config->end[i] * config->scale[i];
+        if (fabs(steps - expected) > config->exactness[i])
+            ck_abort_msg("step generator %u made %.3f steps, not %.3f", i, steps, expected);
     }
 }
 
