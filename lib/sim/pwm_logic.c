@@ -18,7 +18,7 @@
 #define MODE_DOUBLE  0x20u
 #define MODE_MASK    0x3Fu
 #define WIDTH_MIN    9u
-#define SKIP_MAX     (1ll << 40) /* edges at once: rate * edges stays below 2^63 */
+#define SKIP_MAX     (1LL << 40) /* edges at once: rate * edges stays below 2^63 */
 
 /* ---- requests
  * --------------------------------------------------------------------------------------------------------- */

@@ -199,7 +199,7 @@ int64_t sim_pwmgen_position(struct sim_card *const card, const unsigned pwmgen)
     if (p->io[pwmgen] == NO_PIN || sim_card_pad(card, p->io[pwmgen]) != SIM_FLOAT)
         p->turned[pwmgen] += p->duty[pwmgen] - p->seen[pwmgen];
     p->seen[pwmgen] = p->duty[pwmgen];
-    const wide scaled = (wide)p->turned[pwmgen] * (1ll << 32);
+    const wide scaled = (wide)p->turned[pwmgen] * (1LL << 32);
     return (int64_t)(scaled / one - (scaled % one < 0));
 }
 

@@ -6,7 +6,7 @@
 #include "map.h"
 #include "sim_qcounter.h"
 
-#define STEP_ONE (1ll << 32) /* of sim_stepgen_position() */
+#define STEP_ONE (1LL << 32) /* of sim_stepgen_position() */
 
 /* ---- life
  * ------------------------------------------------------------------------------------------------------------- */
