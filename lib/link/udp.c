@@ -62,17 +62,20 @@ static int udp_send(struct link *const link, const void *const data, const size_
     return errno == EMSGSIZE ? HM2_ERR_NOSPACE : HM2_ERR_IO;
 }
 
+static struct timespec span(const int64_t ns)
+{
+    return (struct timespec){.tv_sec = (time_t)(ns / NS_PER_S), .tv_nsec = (long)(ns % NS_PER_S)};
+}
+
 /* Wait until something can be received. False when the deadline is over; then nothing was waited for. */
-static bool wait_until(struct udp *const udp, const int64_t deadline_ns, const int64_t clock_ns)
+static bool wait_until(struct udp *const udp, const int64_t deadline_ns)
 {
     struct pollfd ready = {.fd = udp->fd, .events = POLLIN};
-    for (int64_t now_ns = clock_ns;; now_ns = LINK_CLOCK_UNREAD) {
-        if (now_ns == LINK_CLOCK_UNREAD)
-            now_ns = udp_now(&udp->base);
+    for (;;) {
+        const int64_t now_ns = udp_now(&udp->base);
         if (deadline_ns <= now_ns)
             return false;
-        const int64_t left_ns = deadline_ns - now_ns;
-        const struct timespec timeout = {.tv_sec = (time_t)(left_ns / NS_PER_S), .tv_nsec = (long)(left_ns % NS_PER_S)};
+        const struct timespec timeout = span(deadline_ns - now_ns);
         const int result = ppoll(&ready, 1, &timeout, NULL);
         if (result > 0)
             return true;
@@ -91,33 +94,58 @@ static int64_t busy_end(struct udp *const udp, const int64_t deadline_ns)
     return end_ns < deadline_ns ? end_ns : deadline_ns;
 }
 
-static int udp_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns,
-                    int64_t clock_ns)
+enum got { GOT_ONE, GOT_NOTHING, GOT_ERROR };
+
+/* Take what has arrived. *result is for the caller after GOT_ONE, and an error of ours or 0 after GOT_ERROR. */
+static inline enum got take(struct udp *const udp, void *const data, const size_t cap, int *const result)
 {
-    struct udp *const udp = (struct udp *)link;
+    struct link_counters *const counters = &udp->base.counters;
+    const ssize_t len = recv(udp->fd, data, cap, MSG_DONTWAIT | MSG_TRUNC);
+    if (len >= 0) {
+        counters->received++;
+        *result = (size_t)len <= cap ? (int)len : HM2_ERR_NOSPACE;
+        return GOT_ONE;
+    }
+    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)
+        return GOT_NOTHING; /* woken for nothing, e.g. by a datagram with a bad checksum */
+    counters->receive_errors++;
+    *result = is_nobody_there(errno) ? 0 : HM2_ERR_IO;
+    return GOT_ERROR;
+}
+
+HM2_RARE static int receive(struct udp *const udp, void *const data, const size_t cap, const int64_t deadline_ns)
+{
     /* An ICMP error takes the place of a datagram and may hide one behind it; a few of them are passed over even after
      * the deadline. */
     unsigned passes_after_deadline = 4;
     const int64_t busy_until_ns = busy_end(udp, deadline_ns);
-    for (;; clock_ns = LINK_CLOCK_UNREAD) {
-        const bool in_time =
-            (udp->busy_ns > 0 && udp_now(link) < busy_until_ns) || wait_until(udp, deadline_ns, clock_ns);
-        const ssize_t len = recv(udp->fd, data, cap, MSG_DONTWAIT | MSG_TRUNC);
-        if (len >= 0) {
-            link->counters.received++;
-            return (size_t)len <= cap ? (int)len : HM2_ERR_NOSPACE;
-        }
-        if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) {
-            if (!in_time)
-                return HM2_ERR_TIMEOUT;
-            continue; /* woken for nothing, e.g. by a datagram with a bad checksum */
-        }
-        link->counters.receive_errors++;
-        if (!is_nobody_there(errno))
-            return HM2_ERR_IO;
-        if (!in_time && --passes_after_deadline == 0)
+    for (;;) {
+        const bool in_time = (udp->busy_ns > 0 && udp_now(&udp->base) < busy_until_ns) || wait_until(udp, deadline_ns);
+        int result;
+        const enum got got = take(udp, data, cap, &result);
+        if (got == GOT_ONE || (got == GOT_ERROR && result < 0))
+            return result;
+        if (!in_time && (got == GOT_NOTHING || --passes_after_deadline == 0))
             return HM2_ERR_TIMEOUT;
     }
+}
+
+/* What nearly every cycle is: the caller has just read the clock, and one datagram comes before the deadline. */
+static int udp_recv(struct link *const link, void *const data, const size_t cap, const int64_t deadline_ns,
+                    const int64_t clock_ns)
+{
+    struct udp *const udp = (struct udp *)link;
+    if (clock_ns == LINK_CLOCK_UNREAD || deadline_ns <= clock_ns || udp->busy_ns > 0)
+        return receive(udp, data, cap, deadline_ns);
+    struct pollfd ready = {.fd = udp->fd, .events = POLLIN};
+    const struct timespec timeout = span(deadline_ns - clock_ns);
+    int result;
+    if (ppoll(&ready, 1, &timeout, NULL) > 0) {
+        const enum got got = take(udp, data, cap, &result);
+        if (got == GOT_ONE || (got == GOT_ERROR && result < 0))
+            return result;
+    }
+    return receive(udp, data, cap, deadline_ns);
 }
 
 /* ---- strangers --------------------------------------------------------------------------------------------------- */

@@ -42,10 +42,8 @@ int hm2_timer_add(struct hm2_timer *const timer, const struct hm2_module *const 
                               setup->diag);
 }
 
-void hm2_timer_pack(struct hm2_timer *const timer, const struct hm2_module *const module)
+void hm2_timer_change(struct hm2_timer *const timer, const struct hm2_module *const module)
 {
-    if (!timer->number || *timer->number == timer->seen)
-        return;
     if (!valid(*timer->number)) {
         hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "timer-number", HM2_NO_INSTANCE, *timer->number);
         *timer->number = 0;

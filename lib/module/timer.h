@@ -27,6 +27,11 @@ int HM2_MUST_CHECK hm2_timer_add(struct hm2_timer *timer, const struct hm2_modul
                                  unsigned reg);
 
 /* Hand a changed pin to the plan; a number outside -1 to 4 is rewritten. Realtime safe. */
-void hm2_timer_pack(struct hm2_timer *timer, const struct hm2_module *module);
+HM2_RARE void hm2_timer_change(struct hm2_timer *timer, const struct hm2_module *module);
+static inline void hm2_timer_pack(struct hm2_timer *const timer, const struct hm2_module *const module)
+{
+    if (timer->number && *timer->number != timer->seen)
+        hm2_timer_change(timer, module);
+}
 
 #endif

@@ -104,6 +104,35 @@ static void the_deadline_is_honoured_and_a_past_one_takes_what_is_queued(void **
     (void)close(card.fd);
 }
 
+/* The board reads the clock, sends, and hands the reading on. */
+static void the_callers_reading_of_the_clock_serves_as_well(void **state)
+{
+    (void)state;
+    struct peer card;
+    struct sockaddr_in from;
+    uint8_t data[64];
+    peer_open(&card);
+    struct link *const link = open_link(&card, false);
+    const int64_t begin_ns = link_now_ns(link), deadline_ns = begin_ns + 5 * NS_PER_MS;
+    assert_int_equal(link_recv_from(link, data, sizeof data, deadline_ns, begin_ns), HM2_ERR_TIMEOUT);
+    assert_true(link_now_ns(link) >= deadline_ns);
+    assert_int_equal(link_recv_from(link, data, sizeof data, begin_ns, begin_ns), HM2_ERR_TIMEOUT);
+    assert_int_equal(link_send(link, "a", 1), 0);
+    assert_int_equal(peer_receive(&card, data, sizeof data, &from), 1);
+    send_to(card.fd, &from, "bc", 2);
+    send_to(card.fd, &from, "def", 3);
+    const int64_t now_ns = link_now_ns(link);
+    assert_int_equal(link_recv_from(link, data, sizeof data, now_ns + SOON_NS, now_ns), 2);
+    assert_int_equal(link_recv_from(link, data, 2, now_ns + SOON_NS, now_ns), HM2_ERR_NOSPACE);
+    assert_int_equal(link->counters.received, 2);
+    (void)close(card.fd);
+    assert_int_equal(link_send(link, "g", 1), 0); /* answered by ICMP: port unreachable */
+    const int64_t then_ns = link_now_ns(link);
+    assert_int_equal(link_recv_from(link, data, sizeof data, then_ns + 2 * NS_PER_MS, then_ns), HM2_ERR_TIMEOUT);
+    assert_int_equal(link->counters.receive_errors, 1);
+    link_close(link);
+}
+
 static void busy_polling_receives_and_keeps_the_deadline(void **state)
 {
     (void)state;
@@ -293,6 +322,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_datagram_goes_to_the_card_and_its_reply_comes_back),
         cmocka_unit_test(the_deadline_is_honoured_and_a_past_one_takes_what_is_queued),
+        cmocka_unit_test(the_callers_reading_of_the_clock_serves_as_well),
         cmocka_unit_test(busy_polling_receives_and_keeps_the_deadline),
         cmocka_unit_test(strangers_are_counted_and_never_received),
         cmocka_unit_test(without_a_watch_strangers_are_not_received_either),

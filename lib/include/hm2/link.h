@@ -62,6 +62,7 @@ static inline int HM2_MUST_CHECK link_recv(struct link *const link, void *const 
     return link->ops->recv(link, data, cap, deadline_ns, LINK_CLOCK_UNREAD);
 }
 
+/* The same with a reading of the clock that the caller has just made. */
 static inline int HM2_MUST_CHECK link_recv_from(struct link *const link, void *const data, const size_t cap,
                                                 const int64_t deadline_ns, const int64_t clock_ns)
 {
