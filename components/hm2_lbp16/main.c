@@ -272,13 +272,17 @@ static bool next_line(const char **const text, char line[const MAX_LINE])
 
 /* ---- load and unload --------------------------------------------------------------------------------------------- */
 
-/* Warnings too at the level that hosts print by default: whoever loads a card shall see them. */
+/* Warnings are printed without a level: whoever loads a card shall see them, as hosts do not show the level of
+ * warnings, but LinuxCNC puts every error on the operator's screen, and at every start these are none. */
 static void print_diag(const char *const address, const struct hm2_diag *const diag)
 {
     const char *text = diag->text;
     char line[MAX_LINE];
     while (next_line(&text, line))
-        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: %s\n", address, line);
+        if (strncmp(line, "warning: ", 9) == 0)
+            rtapi_print("hm2_lbp16: card %s: %s\n", address, line);
+        else
+            rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: %s\n", address, line);
 }
 
 static void print_listing(const struct card *const card)
@@ -375,8 +379,7 @@ static int check_lists(const unsigned given)
             }
     for (unsigned i = given; i < MAX_CARDS; i++)
         if (config[i] && config[i][0])
-            rtapi_print_msg(
-                RTAPI_MSG_ERR,
+            rtapi_print(
                 "hm2_lbp16: warning: config: \"%s\" is for card %u, but board_ip has %u; it is ignored (words of a "
                 "configuration are separated by blanks, configurations by commas)\n",
                 config[i], i, given);
@@ -391,10 +394,9 @@ static bool is_one_of(const char *const text, const char *const *const words)
     return false;
 }
 
-/* With the level of errors: LinuxCNC shows no others unless told to. */
 static void tell_no_effect(const char *const parameter, const char *const value, const char *const why)
 {
-    rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: warning: %s=%s has no effect: %s\n", parameter, value, why);
+    rtapi_print("hm2_lbp16: warning: %s=%s has no effect: %s\n", parameter, value, why);
 }
 
 static void tell_no_remotes(const char *const parameter, const int value, const int silent)
