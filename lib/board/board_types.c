@@ -54,7 +54,7 @@ const struct hm2_board_type *hm2_board_type_at(const size_t index)
     return index < TYPES ? types + index : NULL;
 }
 
-const struct hm2_board_type *hm2_board_type_find(const char name[HM2_BOARD_NAME_BYTES])
+const struct hm2_board_type *hm2_board_type_find(const char *const name)
 {
     size_t i = 0;
     while (i + 1 < TYPES && strncmp(name, types[i].name, types[i].compared) != 0)

@@ -37,8 +37,9 @@ struct hm2_board_type {
 
 #define HM2_BOARD_NAME_BYTES 16u
 
-/* Row for a card name (longest match first); for an unknown card the catch-all row, never NULL. */
-HM2_API const struct hm2_board_type *hm2_board_type_find(const char name[HM2_BOARD_NAME_BYTES]);
+/* Row for a card name (longest match first); for an unknown card the catch-all row, never NULL. At most
+ * HM2_BOARD_NAME_BYTES characters are looked at: a name of that length needs no terminating zero. */
+HM2_API const struct hm2_board_type *hm2_board_type_find(const char *name);
 /* The table, for listings and tests: NULL behind its last row, the catch-all, whose stem and name are "". */
 HM2_API const struct hm2_board_type *hm2_board_type_at(size_t index);
 
