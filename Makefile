@@ -109,7 +109,15 @@ $(BUILDDIR)/obj/tests/%: EXTRA_CPPFLAGS := -Ilib/sim -Ilib/halhost -Ilib/halhost
 	-Ilib/hostmot2 -DTEST_DATA='"$(SRCDIR)/tests/data"' -DTEST_BUILD='"$(abspath $(BUILDDIR))"' \
 	-DTEST_SOURCE='"$(SRCDIR)"'
 
-$(BUILDDIR)/obj/%.o: %.c
+# With another compiler or other flags everything is made anew: a folder never holds a mixture.
+FLAGS := $(BUILDDIR)/flags
+flags_text = $(subst ','\'',$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(LDFLAGS) $(EDIT_CFLAGS) $(EDIT_LIBS))
+$(FLAGS): FORCE
+	@mkdir -p $(@D); echo '$(flags_text)' | cmp -s - $@ || echo '$(flags_text)' > $@
+.PHONY: FORCE
+FORCE:
+
+$(BUILDDIR)/obj/%.o: %.c $(FLAGS)
 	@mkdir -p $(@D)
 	$(call say,CC,$<)$(CC) $(ALL_CPPFLAGS) $(EXTRA_CPPFLAGS) $(ALL_CFLAGS) $(DEPFLAGS) -c -o $@ $<
 
@@ -130,8 +138,6 @@ $(LIB_SO): $(LIB_OBJ) lib/libhm2.map
 PATHS := $(BUILDDIR)/paths
 $(PATHS): FORCE
 	@mkdir -p $(@D); echo '$(prefix) $(libdir) $(includedir)' | cmp -s - $@ || echo '$(prefix) $(libdir) $(includedir)' > $@
-.PHONY: FORCE
-FORCE:
 $(call obj,tools/hm2host/main.c): $(PATHS)
 
 $(BUILDDIR)/libhm2.pc: lib/libhm2.pc.in Makefile $(PATHS)
@@ -180,7 +186,7 @@ LINUXCNC_FOLDER = $(eval LINUXCNC_FOLDER := $$(or $$(LINUXCNC_MODULES),$$(call l
 LINUXCNC_SO := $(patsubst %,$(BUILDDIR)/linuxcnc/%.so,$(COMPONENTS))
 
 # LinuxCNC's headers are not clean for -Wpedantic and lack prototypes, in macros that expand here.
-$(BUILDDIR)/obj/linuxcnc/%.o: %.c
+$(BUILDDIR)/obj/linuxcnc/%.o: %.c $(FLAGS)
 	@mkdir -p $(@D)
 	$(call say,CC,$< (LinuxCNC))$(CC) $(ALL_CPPFLAGS) -Icomponents $(LINUXCNC_FLAGS) \
 		$(filter-out -Wpedantic -Wmissing-prototypes,$(ALL_CFLAGS)) $(DEPFLAGS) -c -o $@ $<

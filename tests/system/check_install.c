@@ -24,7 +24,7 @@ static void run(const char *const script, const int limit_ms)
     static char whole[4096];
     const int len = snprintf(
         whole, sizeof whole,
-        "unset MAKEFLAGS MAKELEVEL MFLAGS BUILDDIR CFLAGS LDFLAGS PKG_CONFIG_SYSROOT_DIR\n"
+        "unset MAKEFLAGS MAKELEVEL MFLAGS BUILDDIR SANITIZE CFLAGS LDFLAGS PKG_CONFIG_SYSROOT_DIR\n"
         "cd '%s'; here=$PWD\n"
         "export PKG_CONFIG_PATH=$here/usr/lib/pkgconfig\n"
         "make() { command make -s -j2 -C \"$here/src\" BUILDDIR=\"$here/out\" prefix=\"$here/usr\" \"$@\"; }\n%s",

@@ -244,7 +244,7 @@ static void build(const char *const command)
 {
     char script[2048];
     snprintf(script, sizeof script,
-             "unset MAKEFLAGS MAKELEVEL MFLAGS BUILDDIR\n"
+             "unset MAKEFLAGS MAKELEVEL MFLAGS BUILDDIR SANITIZE CFLAGS\n"
              "make() { command make -s -j2 -C '%s' \"$@\" BUILDDIR='%s/own' DESTDIR='%s/package'; }\n%s",
              TEST_SOURCE, folder, folder, command);
     const char *const argv[] = {"sh", "-c", script, NULL};

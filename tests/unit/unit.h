@@ -13,6 +13,12 @@
 
 #include <cmocka.h>
 
+/* cmocka compares as an unsigned type, which a negative floating-point number cannot be converted to: by way of the
+ * signed one it can, and all other values come to the same. */
+#undef assert_int_equal
+#define assert_int_equal(left, right) \
+    _assert_int_equal((LargestIntegralType)(intmax_t)(left), (LargestIntegralType)(intmax_t)(right), __FILE__, __LINE__)
+
 /* A failed assertion of cmocka does not return, which the static analyzer cannot know. */
 #ifdef __clang_analyzer__
 #undef assert_true
