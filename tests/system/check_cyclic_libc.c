@@ -184,15 +184,7 @@ int printf(const char *const format, ...)
 /* ---- the card, in a thread of its own -----------------------------------------------------------------------------
  */
 
-enum order {
-    ORDER_NONE,
-    ORDER_FAULTS,
-    ORDER_CALM,
-    ORDER_FREEZE,
-    ORDER_THAW,
-    ORDER_POWER_CYCLE,
-    ORDER_LEAVE
-};
+enum order { ORDER_NONE, ORDER_FAULTS, ORDER_CALM, ORDER_FREEZE, ORDER_THAW, ORDER_POWER_CYCLE, ORDER_LEAVE };
 
 struct card {
     struct sim_card *card;
