@@ -26,7 +26,7 @@ static void read_clock(struct encoder_module *const ctx, const struct hm2_cycle 
     const uint16_t ticks = (uint16_t)(stamp - ctx->stamp);
     const double expected = (double)(cycle->now_ns - ctx->stamp_ns) * NS_TO_S;
     ctx->now_ticks += ticks;
-    if (expected > ctx->tick_s * (STAMP_TURN / 2u)) {
+    if (expected > ctx->tick_s * (0.5 * STAMP_TURN)) {
         const double turns = (expected / ctx->tick_s - ticks) * (1.0 / STAMP_TURN);
         if (turns > 0.5 && turns < TURNS_MAX)
             ctx->now_ticks += (uint64_t)(turns + 0.5) * STAMP_TURN;
