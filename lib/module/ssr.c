@@ -59,13 +59,13 @@ static int setup_instance(struct ssr *const ssr, const struct hm2_module *const 
 
 static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 {
+    if (module->instances == 0)
+        return 0;
     struct ssrs *const ctx = hm2_setup_alloc(setup, sizeof *ctx);
     if (!ctx)
         return HM2_ERR_NOMEM;
     module->context = ctx;
     ctx->clock_hz = module->md->clock_hz;
-    if (module->instances == 0)
-        return 0;
     ctx->ssr = hm2_setup_alloc(setup, module->instances * sizeof *ctx->ssr);
     if (!ctx->ssr)
         return HM2_ERR_NOMEM;

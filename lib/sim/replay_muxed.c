@@ -288,6 +288,8 @@ static bool has_inputs(const struct maker *const m)
 int replay_muxed_inputs(const struct replay_trace *const trace, const struct replay_test *const test,
                         struct replay_event_list *const out)
 {
+    if (test->count == 0)
+        return 0;
     struct maker m = {.events = trace->events + test->first, .count = test->count, .out = out, .tick = POWER_UP_TICK};
     sim_divider_start(&m.stamps.divider, 0, 0, SIM_TSDIV_TOP_BIT);
     unsigned edges = 0, clk_per_edge = 0;

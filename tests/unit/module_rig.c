@@ -329,14 +329,14 @@ void rig_read(struct module_rig *const rig)
 {
     exchange(rig);
     for (unsigned i = 0; i < rig->count; i++)
-        if (rig->modules[i].type->unpack)
+        if (rig->modules[i].type->unpack && rig->modules[i].context)
             rig->modules[i].type->unpack(&rig->modules[i], &rig->cycle);
 }
 
 void rig_write_out(struct module_rig *const rig)
 {
     for (unsigned i = 0; i < rig->count; i++)
-        if (rig->modules[i].type->pack)
+        if (rig->modules[i].type->pack && rig->modules[i].context)
             rig->modules[i].type->pack(&rig->modules[i], &rig->cycle);
     send_write(rig);
     rig->cycle.writes++;
