@@ -121,7 +121,7 @@ HM2_RARE static int receive(struct udp *const udp, void *const data, const size_
     const int64_t busy_until_ns = busy_end(udp, deadline_ns);
     for (;;) {
         const bool in_time = (udp->busy_ns > 0 && udp_now(&udp->base) < busy_until_ns) || wait_until(udp, deadline_ns);
-        int result;
+        int result = 0;
         const enum got got = take(udp, data, cap, &result);
         if (got == GOT_ONE || (got == GOT_ERROR && result < 0))
             return result;
@@ -139,7 +139,7 @@ static int udp_recv(struct link *const link, void *const data, const size_t cap,
         return receive(udp, data, cap, deadline_ns);
     struct pollfd ready = {.fd = udp->fd, .events = POLLIN};
     const struct timespec timeout = span(deadline_ns - clock_ns);
-    int result;
+    int result = 0;
     if (ppoll(&ready, 1, &timeout, NULL) > 0) {
         const enum got got = take(udp, data, cap, &result);
         if (got == GOT_ONE || (got == GOT_ERROR && result < 0))
