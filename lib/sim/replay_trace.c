@@ -176,7 +176,8 @@ int replay_trace_merge(struct replay_trace *const merged, const struct replay_tr
         if (err)
             return err;
     }
-    qsort(list->events, list->count, sizeof(*list->events), by_time);
+    if (list->count > 0) /* an empty list has no memory, and qsort() wants some */
+        qsort(list->events, list->count, sizeof(*list->events), by_time);
     *merged = (struct replay_trace){.in_ns = trace->in_ns, .events = list->events, .event_count = list->count};
     return 0;
 }
