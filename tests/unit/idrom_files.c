@@ -12,7 +12,8 @@ char *load_text(const char *const path, size_t *const len)
     assert_non_null(text);
     *len = fread(text, 1, capacity - 1, file);
     text[*len] = '\0';
-    assert_int_equal(fclose(file), 0);
+    const int closed = fclose(file);
+    assert_int_equal(closed, 0);
     return text;
 }
 
