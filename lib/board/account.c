@@ -34,6 +34,7 @@ void board_cycle_failed(struct hm2_board *const board, const bool raise_level)
     const struct board_points *const p = board->points;
     *p->error = true;
     *p->error_total = *p->error_total + 1u;
+    board->rearm_ns = 0;
     if (!raise_level)
         return;
     const int32_t limit = at_least_one(*p->error_limit);

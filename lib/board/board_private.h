@@ -27,6 +27,9 @@ struct board_points {
     hm2_u32_t *data_age;
     hm2_float_t *rtt_min_us, *rtt_us, *rtt_max_us;
     hm2_bit_t *rtt_reset;
+    hm2_bit_t *position_lost;
+    hm2_bit_t *auto_rearm;
+    hm2_u32_t *rearms;
 };
 
 int board_points_bind(struct hm2_board *board, struct hm2_binder *binder, struct hm2_diag *diag);
@@ -167,6 +170,8 @@ struct hm2_board {
     uint32_t last_loss_cycle; /* when a request or a write was lost */
     bool lossy;               /* there was one */
     bool rtt_known;
+    bool bitten;      /* as of the last good cycle: outputs are off until has_bit is cleared */
+    int64_t rearm_ns; /* how long auto-rearm has waited */
 
     enum board_recovery recovery;
     bool foreign; /* the card came back with other firmware */
@@ -200,6 +205,11 @@ const uint8_t *board_recovery_request(struct hm2_board *board);
 void board_recovery_identified(struct hm2_board *board);
 /* Everything is confirmed, and a reply of the card in its new life is in the windows. */
 void board_recovery_end(struct hm2_board *board);
+
+/* Realtime safe. While io_error stops the board, once a cycle: auto-rearm may set it to 0. */
+void board_rearm_io(struct hm2_board *board);
+/* Once in every good cycle in which the watchdog has bitten, or had bitten in the cycle before. */
+void board_stay_bitten(struct hm2_board *board, bool bitten);
 
 void board_start_modules(struct hm2_board *board);
 /* Facts of the present cycle; valid until the next call. */

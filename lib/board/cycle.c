@@ -173,6 +173,9 @@ static void unpack_all(struct hm2_board *const board)
 {
     call_all(&board->unpacks, board_cycle(board, board->request_ns, hm2_watchdog_bitten(board->watchdog)));
     *board->points->data_age = 0;
+    const bool bitten = hm2_watchdog_bitten(board->watchdog);
+    if (bitten || board->bitten)
+        board_stay_bitten(board, bitten);
 }
 
 HM2_RARE static void tell_write_lost(struct hm2_board *const board)
@@ -253,6 +256,8 @@ void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
     if (is_stopped(board)) {
         if (board->outstanding)
             give_up(board);
+        if (board->state == BOARD_RUNS)
+            board_rearm_io(board);
         return;
     }
     int64_t clock_ns = LINK_CLOCK_UNREAD;

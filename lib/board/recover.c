@@ -77,6 +77,7 @@ void board_recovery_end(struct hm2_board *const board)
 {
     board->recovery = BOARD_NORMAL;
     board_start_modules(board);
+    *board->points->position_lost = true;
     /* Without a watchdog there is no has_bit for a person to clear before outputs come back. */
     if (!board->watchdog)
         *board->points->io_error = true;

@@ -146,6 +146,13 @@ void hm2_watchdog_raise(struct hm2_module *const module)
         bite(module->context);
 }
 
+void hm2_watchdog_clear(struct hm2_module *const module)
+{
+    const struct watchdog *const ctx = module ? module->context : NULL;
+    if (ctx)
+        *ctx->has_bit = false;
+}
+
 uint16_t hm2_watchdog_timer_address(const struct hm2_module *const module)
 {
     return module ? hm2_md_address(module->md, REG_TIMER, 0) : 0;

@@ -13,6 +13,8 @@
 bool hm2_watchdog_bitten(const struct hm2_module *module);
 /* Treat the card as bitten (it lost its power and came back): has_bit becomes 1. */
 void hm2_watchdog_raise(struct hm2_module *module);
+/* As if a person had set has_bit to 0. */
+void hm2_watchdog_clear(struct hm2_module *module);
 /* Address of the timer register; writing 1 there makes the dog bite at once (hal-interface 1.7). 0 without module. */
 uint16_t hm2_watchdog_timer_address(const struct hm2_module *module);
 

@@ -1126,6 +1126,102 @@ static void the_right_firmware_programmed_again_is_restored(void **state)
     assert_int_equal(f->probe->starts, 2);
 }
 
+/* ---- coming back without a person -----------------------------------------------------------------------------------
+ */
+
+static void without_auto_rearm_a_card_that_is_back_waits_for_ever(void **state)
+{
+    struct fixture *const f = *state;
+    start(f);
+    cycles(f, 10);
+    EXPECT("position-lost", 0);
+    bite(f);
+    cycles(f, 2);
+    EXPECT("position-lost", 1);
+    set(f, "position-lost", 0);
+    cycles(f, 5000);
+    EXPECT("watchdog.has_bit", 1);
+    EXPECT("position-lost", 0); /* a person has seen it */
+    EXPECT("auto-rearms", 0);
+    f->card.dead = true;
+    cycles(f, 5000);
+    EXPECT("io_error", 1);
+}
+
+static void with_auto_rearm_a_bite_is_cleared_after_half_a_second_of_good_cycles(void **state)
+{
+    struct fixture *const f = *state;
+    start(f);
+    set(f, "auto-rearm", 1);
+    set(f, "probe.out", 9);
+    cycles(f, 10);
+    bite(f);
+    cycles(f, 400);
+    EXPECT("watchdog.has_bit", 1);
+    f->card.lose_reply = true; /* a card that comes and goes has to be there for the whole time */
+    cycle(f);
+    cycles(f, 400);
+    EXPECT("watchdog.has_bit", 1);
+    assert_int_equal(f->card.registers[PROBE_WRITE / 4], 0);
+    cycles(f, 110);
+    EXPECT("watchdog.has_bit", 0);
+    EXPECT("auto-rearms", 1);
+    EXPECT("position-lost", 1);
+    assert_int_equal(f->card.registers[PROBE_WRITE / 4], 9);
+}
+
+static void with_auto_rearm_a_card_comes_back_after_any_power_cut(void **state)
+{
+    struct fixture *const f = *state;
+    start(f);
+    set(f, "auto-rearm", 1);
+    set(f, "probe.out", 9);
+    cycles(f, 10);
+    f->card.dead = true;
+    cycles(f, 60000);
+    EXPECT("packet-error-exceeded", 1);
+    EXPECT("auto-rearms", 0);
+    f->card.dead = false;
+    fake_card_power_cycle(&f->card);
+    cycles(f, 400);
+    EXPECT("io_error", 0);
+    EXPECT("watchdog.has_bit", 1);
+    EXPECT("position-lost", 1);
+    assert_int_equal(f->card.registers[PROBE_WRITE / 4], 0);
+    cycles(f, 300);
+    EXPECT("watchdog.has_bit", 0);
+    EXPECT("auto-rearms", 1);
+    assert_int_equal(f->card.registers[PROBE_WRITE / 4], 9);
+}
+
+static void a_dead_card_is_asked_for_five_cycles_every_tenth_of_a_second(void **state)
+{
+    struct fixture *const f = *state;
+    start(f);
+    set(f, "auto-rearm", 1);
+    f->card.dead = true;
+    cycles(f, 1000);
+    assert_in_range((unsigned)get(f, "packet-error-total"), 45, 55);
+}
+
+static void auto_rearm_leaves_alone_what_a_person_stopped_and_other_firmware(void **state)
+{
+    struct fixture *const f = *state;
+    start(f);
+    set(f, "auto-rearm", 1);
+    cycles(f, 10);
+    set(f, "io_error", 1);
+    cycles(f, 1000);
+    EXPECT("io_error", 1);
+    set(f, "io_error", 0);
+    cycles(f, 10);
+    f->card.image.id[2] = 0x33544F4D;
+    fake_card_power_cycle(&f->card);
+    cycles(f, 2000);
+    EXPECT("io_error", 1);
+    EXPECT("auto-rearms", 0);
+}
+
 /* ---- other messages -----------------------------------------------------------------------------------------------
  */
 
@@ -1208,6 +1304,11 @@ int main(void)
         TEST(a_restore_ends_only_when_everything_is_confirmed_whatever_is_lost),
         TEST(firmware_that_changes_during_a_restore_is_refused_too),
         TEST(without_a_watchdog_io_error_holds_the_outputs_after_a_power_loss),
+        TEST(without_auto_rearm_a_card_that_is_back_waits_for_ever),
+        TEST(with_auto_rearm_a_bite_is_cleared_after_half_a_second_of_good_cycles),
+        TEST(with_auto_rearm_a_card_comes_back_after_any_power_cut),
+        TEST(a_dead_card_is_asked_for_five_cycles_every_tenth_of_a_second),
+        TEST(auto_rearm_leaves_alone_what_a_person_stopped_and_other_firmware),
         TEST(a_long_power_cut_needs_io_error_and_has_bit_cleared),
         TEST(other_firmware_is_refused_and_nothing_more_is_sent),
         TEST(the_right_firmware_programmed_again_is_restored),
