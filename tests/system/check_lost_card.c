@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Cable out, interface down, power gone, under LinuxCNC: the card comes back without a restart, by a person's hand or
+ * by auto-rearm. LOST_CARD_SECONDS="1 10 60" sets for how long each time.
+ */
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "process.h"
+
+#define LIMIT_MS   1200000
+#define CANNOT_RUN 77
+
+static struct process run;
+
+static void set(const char *const name, const char *const value)
+{
+    ck_assert_int_eq(setenv(name, value, 1), 0);
+}
+
+START_TEST(a_lost_card_comes_back_without_a_restart)
+{
+    static const char out[] = TEST_BUILD "/lost-card";
+    const char *const seconds = getenv("LOST_CARD_SECONDS");
+    const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer", TEST_BUILD, out,   "7i96s",
+                                TEST_SOURCE "/tests/system/hal/lost.hal",  "--follow", "0:0", NULL};
+    const char *skip;
+    if (TEST_SANITIZED) {
+        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+        return;
+    }
+    (void)mkdir(out, 0755);
+    set("PEER_DRIVER", "hm2_lbp16");
+    set("PEER_CONFIG", "num_stepgens=5");
+    set("PEER_CARD", "hm2_7i96s.0");
+    set("PEER_MODULES", TEST_BUILD "/linuxcnc");
+    set("PEER_TIMEOUT", "1100");
+    set("LOSE_CARD", TEST_SOURCE "/tests/system/linuxcnc/lose-card");
+    set("LOSE_SECONDS", seconds ? seconds : "1");
+    process_run(&run, argv, LIMIT_MS);
+    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
+        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
+        return;
+    }
+    if (run.status != 0 || !process_wait_line(&run, "ok all", 0, NULL)) {
+        printf("%s\n", run.text);
+        fflush(stdout);
+        ck_abort_msg("the card did not come back as it should, status %d", run.status);
+    }
+}
+END_TEST
+
+int main(void)
+{
+    Suite *const suite = suite_create("lost card");
+    TCase *const tests = tcase_create("LinuxCNC");
+    tcase_set_timeout(tests, 1250);
+    tcase_add_test(tests, a_lost_card_comes_back_without_a_restart);
+    suite_add_tcase(suite, tests);
+    SRunner *const runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    const int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed > 0;
+}
