@@ -65,6 +65,10 @@ MAN_PAGES = $(sort $(wildcard man/*.[0-9])) $(BUILDDIR)/man/hm2_lbp16.9
 EDIT_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libedit 2>/dev/null)
 EDIT_LIBS ?= $(shell $(PKG_CONFIG) --libs libedit 2>/dev/null)
 
+# Rules that keep other programs off the cards' interfaces; without it the component says that there are none.
+NFT_LIBS ?= $(shell $(PKG_CONFIG) --libs libnftables 2>/dev/null)
+LIBS_hm2_lbp16 := $(NFT_LIBS)
+
 obj = $(patsubst %.c,$(BUILDDIR)/obj/%.o,$(1))
 LIB_OBJ := $(call obj,$(LIB_SRC))
 SIM_OBJ := $(call obj,$(SIM_SRC))
@@ -100,6 +104,7 @@ help: ## this list
 $(BUILDDIR)/obj/lib/sim/%: EXTRA_CPPFLAGS := -Ilib/sim
 $(BUILDDIR)/obj/lib/halhost/%: EXTRA_CPPFLAGS := -Ilib/halhost -Ilib/halhost/include
 $(BUILDDIR)/obj/components/%: EXTRA_CPPFLAGS := -Icomponents -Ilib/halhost/include -DRTAPI -D__MODULE__
+$(BUILDDIR)/obj/components/hm2_lbp16/% $(BUILDDIR)/obj/linuxcnc/components/hm2_lbp16/%: override CPPFLAGS += $(if $(NFT_LIBS),-DHM2_HAVE_NFTABLES)
 $(BUILDDIR)/obj/tests/components/%: EXTRA_CPPFLAGS := -Icomponents -Ilib/halhost/include -DRTAPI -D__MODULE__
 # What a component exports is said by its EXPORT_SYMBOL()s and done by the linker (see component_link).
 $(BUILDDIR)/obj/components/% $(BUILDDIR)/obj/tests/components/%: VISIBILITY := default
@@ -111,7 +116,7 @@ $(BUILDDIR)/obj/tests/%: EXTRA_CPPFLAGS := -Ilib/sim -Ilib/halhost -Ilib/halhost
 
 # With another compiler or other flags everything is made anew: a folder never holds a mixture.
 FLAGS := $(BUILDDIR)/flags
-flags_text = $(subst ','\'',$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(LDFLAGS) $(EDIT_CFLAGS) $(EDIT_LIBS))
+flags_text = $(subst ','\'',$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(LDFLAGS) $(EDIT_CFLAGS) $(EDIT_LIBS) $(NFT_LIBS))
 $(FLAGS): FORCE
 	@mkdir -p $(@D); echo '$(flags_text)' | cmp -s - $@ || echo '$(flags_text)' > $@
 .PHONY: FORCE
@@ -163,7 +168,7 @@ define component_link
 	@{ echo '{ global:'; $(NM) $(filter %.o,$^) | sed -n 's/.* rtapi_exported_\(.*\)/\1;/p'; \
 		echo 'local: *; };'; } >$@.map
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -shared -Wl,--exclude-libs,ALL -Wl,--version-script,$@.map -o $@ \
-		$(filter %.o,$^) $(LIB_A) -lm -lpthread
+		$(filter %.o,$^) $(LIB_A) $(LIBS_$(basename $(@F))) -lm -lpthread
 endef
 
 define component_rule

@@ -22,6 +22,7 @@
 #include <hm2/link.h>
 
 #include "common/hal_binder.h"
+#include "isolation.h"
 
 MODULE_AUTHOR("libhm2 developers");
 MODULE_DESCRIPTION("Mesa Electronics HostMot2 cards over Ethernet (LBP16)");
@@ -42,7 +43,7 @@ RTAPI_MP_INT(busy_poll, "SO_BUSY_POLL of the sockets in microseconds; 0 = off");
 static char *board_rtnet[MAX_CARDS];
 RTAPI_MP_ARRAY_STRING(board_rtnet, MAX_CARDS, "accepted for compatibility; sockets are always ordinary ones");
 static char *firewall = 0;
-RTAPI_MP_STRING(firewall, "accepted for compatibility; this component never touches the firewall");
+RTAPI_MP_STRING(firewall, "auto (default), none, or nft: keep other programs off the cards' interfaces");
 static int debug_idrom = 0;
 RTAPI_MP_INT(debug_idrom, "print the IDROM header at load");
 static int debug_module_descriptors = 0;
@@ -69,6 +70,7 @@ static int component_id;
 static struct card cards[MAX_CARDS];
 static unsigned card_count;
 static struct hal_binder hal;
+static struct isolation isolation;
 static atomic_bool closing; /* no function may touch a board any more */
 
 /* ---- functions of a card ------------------------------------------------------------------------------------------
@@ -274,15 +276,15 @@ static bool next_line(const char **const text, char line[const MAX_LINE])
 
 /* Warnings are printed without a level: whoever loads a card shall see them, as hosts do not show the level of
  * warnings, but LinuxCNC puts every error on the operator's screen, and at every start these are none. */
-static void print_diag(const char *const address, const struct hm2_diag *const diag)
+static void print_diag(const char *const subject, const struct hm2_diag *const diag)
 {
     const char *text = diag->text;
     char line[MAX_LINE];
     while (next_line(&text, line))
         if (strncmp(line, "warning: ", 9) == 0)
-            rtapi_print("hm2_lbp16: card %s: %s\n", address, line);
+            rtapi_print("hm2_lbp16: %s: %s\n", subject, line);
         else
-            rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: %s\n", address, line);
+            rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: %s: %s\n", subject, line);
 }
 
 static void print_listing(const struct card *const card)
@@ -329,6 +331,7 @@ static int load_card(const char *const address, const char *const configuration)
 {
     struct card *const card = &cards[card_count];
     struct hm2_diag diag;
+    char subject[64];
 
     hm2_diag_clear(&diag);
     card->board = hm2_board_new();
@@ -341,7 +344,8 @@ static int load_card(const char *const address, const char *const configuration)
     card->cycle = 0;
     card_count++;
     const int err = bring_up(card, address, configuration, &diag);
-    print_diag(address, &diag);
+    rtapi_snprintf(subject, sizeof subject, "card %s", address);
+    print_diag(subject, &diag);
     if (err != HM2_OK) {
         rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: not loaded: %s\n", address, hm2_strerror(err));
         return -EINVAL;
@@ -411,18 +415,47 @@ static void tell_no_remotes(const char *const parameter, const int value, const 
 static void tell_what_has_no_effect(void)
 {
     static const char *const ordinary[] = {"", "posix", NULL};
-    static const char *const automatic[] = {"", "auto", "none", NULL};
     for (unsigned i = 0; i < MAX_CARDS; i++)
         if (board_rtnet[i] && !is_one_of(board_rtnet[i], ordinary))
             tell_no_effect("board_rtnet", board_rtnet[i], "the sockets are those of the kernel (posix)");
-    if (firewall && !is_one_of(firewall, automatic))
-        tell_no_effect("firewall", firewall, "keep other programs off the card's network by rules of your own");
     tell_no_remotes("use_serial_numbers", use_serial_numbers, 0);
     tell_no_remotes("sserial_baudrate", sserial_baudrate, -1);
 }
 
+static const struct {
+    const char *word;
+    enum isolation_mode mode;
+} firewalls[] = {
+    {"auto", ISOLATION_AUTO},       {"none", ISOLATION_NONE},       {"nft", ISOLATION_FORCED}, {"", ISOLATION_AUTO},
+    {"nftables", ISOLATION_FORCED}, {"iptables", ISOLATION_FORCED}, /* LinuxCNC's other word; the rules are the same */
+};
+
+static int find_isolation(enum isolation_mode *const mode)
+{
+    const char *const wanted = firewall ? firewall : "auto";
+    for (size_t i = 0; i < sizeof firewalls / sizeof firewalls[0]; i++)
+        if (strcmp(wanted, firewalls[i].word) == 0) {
+            *mode = firewalls[i].mode;
+            return 0;
+        }
+    rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: firewall=%s: expected auto, none or nft\n", wanted);
+    return -EINVAL;
+}
+
+static void isolate(const unsigned count, const enum isolation_mode mode)
+{
+    const char *addresses[MAX_CARDS];
+    struct hm2_diag diag;
+    hm2_diag_clear(&diag);
+    for (unsigned i = 0; i < count; i++)
+        addresses[i] = board_ip[i];
+    isolation_begin(&isolation, addresses, count, mode, &diag);
+    print_diag("network", &diag);
+}
+
 static int load_cards(void)
 {
+    enum isolation_mode mode;
     tell_what_has_no_effect();
     if (!board_ip[0] || !board_ip[0][0]) {
         rtapi_print_msg(RTAPI_MSG_ERR,
@@ -432,9 +465,13 @@ static int load_cards(void)
     unsigned given = 0;
     while (given < MAX_CARDS && board_ip[given] && board_ip[given][0])
         given++;
-    int result = check_lists(given);
+    int result = find_isolation(&mode);
+    if (result == 0)
+        result = check_lists(given);
     for (unsigned i = 0; result == 0 && i < given; i++)
         result = load_card(board_ip[i], config[i]);
+    if (result == 0)
+        isolate(given, mode);
     return result;
 }
 
@@ -447,6 +484,7 @@ static void unload_cards(void)
     stop_messenger();
     print_messages();
     hal_exit(component_id);
+    isolation_end(&isolation);
     for (unsigned i = 0; i < card_count; i++)
         hm2_board_free(cards[i].board);
     card_count = 0;
