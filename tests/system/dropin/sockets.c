@@ -36,7 +36,7 @@ static struct {
     void *context;
     int64_t spent_ns;     /* by reading clocks, not yet known to the net */
     unsigned clock_calls; /* since the last call that does something */
-    int card_fd;          /* the socket that was connected, -1 = none */
+    int card_fd;          /* the socket that was connected first, -1 = none */
     int pending_len;      /* of a datagram that a wait has brought, -1 = none */
     uint8_t pending[LINK_MAX_DATAGRAM_BYTES];
 } shim = {.card_fd = -1, .pending_len = -1};
@@ -114,7 +114,8 @@ int connect(const int fd, __CONST_SOCKADDR_ARG address, const socklen_t len)
 {
     if (!engaged)
         return (int)syscall(SYS_connect, fd, address.__sockaddr__, len);
-    shim.card_fd = fd;
+    if (shim.card_fd < 0)
+        shim.card_fd = fd; /* others only ask for the way to the card */
     return 0;
 }
 
@@ -218,12 +219,12 @@ int getpeername(const int fd, __SOCKADDR_ARG address, socklen_t *const len)
                    : (int)syscall(SYS_getpeername, fd, address.__sockaddr__, len);
 }
 
-/* One interface, with the address that getsockname() tells. */
+/* One interface, with the address that getsockname() tells; one that no driver closes to others. */
 int getifaddrs(struct ifaddrs **const list)
 {
     static char name[] = "hm2sim";
     static struct sockaddr_in address;
-    static struct ifaddrs one = {.ifa_name = name, .ifa_flags = IFF_UP, .ifa_addr = (struct sockaddr *)&address};
+    static struct ifaddrs one = {.ifa_name = name, .ifa_flags = IFF_UP | IFF_LOOPBACK, .ifa_addr = (struct sockaddr *)&address};
     address = (struct sockaddr_in){.sin_family = AF_INET, .sin_addr.s_addr = inet_addr(HOST_IP)};
     *list = &one;
     return 0;
