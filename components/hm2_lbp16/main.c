@@ -22,6 +22,7 @@
 #include <hm2/link.h>
 
 #include "common/hal_binder.h"
+#include "flight_files.h"
 #include "isolation.h"
 
 MODULE_AUTHOR("libhm2 developers");
@@ -38,6 +39,13 @@ static int debug = 0;
 RTAPI_MP_INT(debug, "1 = print the pin listing and packet sizes at load");
 static int busy_poll = 0;
 RTAPI_MP_INT(busy_poll, "SO_BUSY_POLL of the sockets in microseconds; 0 = off");
+
+static char *flight_folder = 0;
+RTAPI_MP_STRING(flight_folder, "record the times of the last cycles and write them here when one is lost or slow");
+static int flight_cycles = 4096;
+RTAPI_MP_INT(flight_cycles, "cycles that the flight recorder keeps, 64 to 65536");
+static int flight_slow_us = 0;
+RTAPI_MP_INT(flight_slow_us, "cycles that take longer are slow; 0 = no limit");
 
 /* Accepted so that load lines written for hostmot2 and hm2_eth work unchanged; hm2_lbp16(9) says what each does. */
 static char *board_rtnet[MAX_CARDS];
@@ -58,6 +66,7 @@ static int sserial_baudrate = -1;
 RTAPI_MP_INT(sserial_baudrate, "force the smart-serial baud rate; -1 = as the firmware has it");
 
 #define NO_THREAD (-1)
+#define NS_PER_US 1000
 
 struct card {
     struct hm2_board *board;
@@ -202,12 +211,21 @@ static void print_messages(void)
             rtapi_print_msg(error ? RTAPI_MSG_ERR : RTAPI_MSG_WARN, "hm2_lbp16: %s\n", text);
 }
 
+static void write_flights(void)
+{
+    char text[512];
+    for (unsigned i = 0; i < card_count; i++)
+        if (flight_file_write(cards[i].board, flight_folder, text, sizeof text))
+            rtapi_print("hm2_lbp16: %s\n", text);
+}
+
 static void *messenger_main(void *const unused)
 {
     const struct timespec pause = {.tv_nsec = MESSAGE_POLL_NS};
     (void)unused;
     while (!atomic_load(&messenger_ends)) {
         print_messages();
+        write_flights();
         nanosleep(&pause, NULL);
     }
     return NULL;
@@ -320,6 +338,9 @@ static int bring_up(struct card *const card, const char *const address, const ch
     int err = link_udp_open(&link, &options, diag);
     if (err == HM2_OK)
         err = hm2_board_identify(card->board, link, diag);
+    if (err == HM2_OK && flight_folder && flight_folder[0])
+        err = hm2_board_record(card->board, flight_cycles < 0 ? 0 : (unsigned)flight_cycles,
+                               (int64_t)flight_slow_us * NS_PER_US, diag);
     if (err == HM2_OK)
         err = hm2_board_setup(card->board, cards_of_same_name(card), &hal.binder, configuration, diag);
     if (err == HM2_OK)
@@ -483,6 +504,7 @@ static void unload_cards(void)
         hm2_board_stop(cards[i].board);
     stop_messenger();
     print_messages();
+    write_flights();
     hal_exit(component_id);
     isolation_end(&isolation);
     for (unsigned i = 0; i < card_count; i++)

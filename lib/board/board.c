@@ -26,6 +26,7 @@ void hm2_board_free(struct hm2_board *const board)
     if (!board)
         return;
     link_close(board->link);
+    free(board->flight);
     free(board);
 }
 

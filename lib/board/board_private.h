@@ -9,6 +9,7 @@
 #include <hm2/board.h>
 #include <hm2/module.h>
 
+#include "flight.h"
 #include "notice.h"
 
 #define BOARD_STEM_SIZE   8u
@@ -156,10 +157,12 @@ struct hm2_board {
     struct board_buffer reply; /* of the plan */
     struct hm2_plan *plan;
     struct board_points *points;
+    struct board_flight *flight; /* NULL = cycles are not recorded */
 
     /* the cycle */
     bool outstanding, sent; /* a request waits for read(); it could be sent */
     int64_t request_ns, period_ns;
+    int64_t received_ns;                        /* of the good reply to the last request; 0 = none */
     int64_t read_limit_ns, limit_for_period_ns; /* how long a reply is waited for, and what that was computed from */
     int32_t limit_for_setting;
     struct hm2_cycle cycle;   /* as the modules are told */

@@ -57,6 +57,27 @@ HM2_RARE static void start_again(struct hm2_board *const board)
         board->recovery = BOARD_ASKS_IDENTITY;
 }
 
+static uint32_t bad_datagrams(const struct hm2_board *const board)
+{
+    const struct board_points *const p = board->points;
+    return *p->late + *p->stale + *p->malformed;
+}
+
+HM2_RARE static void record_request(struct hm2_board *const board, const size_t len)
+{
+    board_flight_begin(board->flight, board->request_ns, link_now_ns(board->link), board->period_ns, len,
+                       bad_datagrams(board));
+}
+
+HM2_RARE static void record_read(struct hm2_board *const board)
+{
+    const unsigned lost = board->received_ns == 0 ? HM2_FLIGHT_LOST : 0;
+    const unsigned failed = *board->points->error ? HM2_FLIGHT_FAILED : 0;
+    const unsigned write_lost = lost || hm2_plan_facts(board->plan).write_confirmed ? 0 : HM2_FLIGHT_WRITE_LOST;
+    board_flight_decoded(board->flight, board->received_ns, link_now_ns(board->link), hm2_plan_reply_bytes(board->plan),
+                         lost | failed | write_lost, bad_datagrams(board));
+}
+
 static inline void send_request(struct hm2_board *const board, const int64_t period_ns)
 {
     if (level_exceeded(board))
@@ -68,6 +89,8 @@ static inline void send_request(struct hm2_board *const board, const int64_t per
     board->notices.now_ns = board->request_ns = link_now_ns(board->link);
     board->sent = link_send(board->link, bytes, len) == 0;
     board->outstanding = true;
+    if (board->flight)
+        record_request(board, len);
 }
 
 void hm2_board_request(struct hm2_board *const board, const int64_t period_ns)
@@ -149,7 +172,8 @@ static inline bool receive(struct hm2_board *const board, const struct board_buf
 static void measure_round_trip(struct hm2_board *const board)
 {
     const struct board_points *const p = board->points;
-    const double us = (double)(link_now_ns(board->link) - board->request_ns) * 1e-3;
+    board->received_ns = link_now_ns(board->link);
+    const double us = (double)(board->received_ns - board->request_ns) * 1e-3;
     *p->rtt_us = us;
     if (*p->rtt_reset || !board->rtt_known) {
         *p->rtt_reset = false;
@@ -266,6 +290,7 @@ void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
         clock_ns = board->request_ns;
     }
     board->cycles++;
+    board->received_ns = 0;
     count(board->points->data_age);
     *board->points->strangers = (uint32_t)link_strangers(board->link);
     if (board->recovery == BOARD_ASKS_IDENTITY) {
@@ -277,6 +302,8 @@ void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
         measure_round_trip(board);
         use_reply(board);
     }
+    if (board->flight)
+        record_read(board);
 }
 
 /* ---- write --------------------------------------------------------------------------------------------------------
@@ -302,4 +329,6 @@ void hm2_board_write(struct hm2_board *const board, const int64_t period_ns)
         hm2_plan_write_failed(board->plan);
         note_loss(board);
     }
+    if (board->flight)
+        board_flight_written(board->flight, now_ns, link_now_ns(board->link), len);
 }

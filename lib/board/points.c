@@ -35,8 +35,19 @@ static const struct hm2_point points[] = {
     P(rtt_reset, "rtt-reset", HM2_BIT, HM2_PIN_IO, 0, "", "set to 1 to start the shortest and longest anew"),
 };
 
+#define F(field, name, type, dir, init, unit, help) \
+    HM2_POINT(struct board_flight_points, field, name, type, dir, init, unit, help)
+
+static const struct hm2_point flight_points[] = {
+    F(freeze, "flight.freeze", HM2_BIT, HM2_PIN_IO, 0, "", "set to 1 to have the last cycles written to a file"),
+    F(freezes, "flight.freezes", HM2_U32, HM2_PIN_OUT, 0, "",
+      "times that the recorder has stopped for a lost or slow cycle, or on request"),
+};
+#define FLIGHT_POINTS (sizeof flight_points / sizeof flight_points[0])
+
 static const struct hm2_point_group groups[] = {
     {"", points, sizeof points / sizeof points[0], NULL},
+    {"", flight_points, FLIGHT_POINTS, "with flight_folder="},
     {NULL, NULL, 0, NULL},
 };
 
@@ -45,10 +56,22 @@ const struct hm2_point_group *hm2_board_point_groups(void)
     return groups;
 }
 
+static int bind_flight(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
+{
+    struct board_flight_points *const bound = binder->alloc(binder, sizeof *bound);
+    if (!bound)
+        return hm2_diag_add(diag, HM2_ERR_NOMEM, "%s: the host gave no memory for the recorder's points",
+                            board->prefix);
+    board->flight->points = bound;
+    return hm2_bind_points(binder, flight_points, FLIGHT_POINTS, bound, board->prefix, 0, diag);
+}
+
 int board_points_bind(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
 {
     board->points = binder->alloc(binder, sizeof *board->points);
     if (!board->points)
         return hm2_diag_add(diag, HM2_ERR_NOMEM, "%s: the host gave no memory for the board's points", board->prefix);
-    return hm2_bind_points(binder, points, sizeof points / sizeof points[0], board->points, board->prefix, 0, diag);
+    const int err =
+        hm2_bind_points(binder, points, sizeof points / sizeof points[0], board->points, board->prefix, 0, diag);
+    return err == 0 && board->flight ? bind_flight(board, binder, diag) : err;
 }

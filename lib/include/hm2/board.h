@@ -18,6 +18,7 @@
 
 #include <hm2/config.h>
 #include <hm2/err.h>
+#include <hm2/flight.h>
 #include <hm2/idrom.h>
 #include <hm2/link.h>
 #include <hm2/module.h>
@@ -77,6 +78,17 @@ HM2_API bool hm2_board_request_outstanding(const struct hm2_board *board);
 /* What happened, for people. Not realtime; may run in another thread than the cycle. Returns 1 with one sentence in
  * text and its severity in *error (true = an operator must know), 0 when there is nothing new. */
 HM2_API int hm2_board_next_message(struct hm2_board *board, char *text, size_t size, bool *error);
+
+/* Record the times of the last cycles (rounded up to a power of two), and stop for a lost one and for one that takes
+ * longer than slow_ns (0 = no limit). Before setup; not realtime. Adds the points flight.*. */
+HM2_API int HM2_MUST_CHECK hm2_board_record(struct hm2_board *board, unsigned cycles, int64_t slow_ns,
+                                            struct hm2_diag *diag);
+/* Not realtime, and may run in another thread than the cycle: number of cycles in a recorder that has stopped, with
+ * what stopped it in *head; 0 while it records. Until hm2_board_flight_resume() they can be read, the oldest as index
+ * 0. */
+HM2_API unsigned hm2_board_flight(const struct hm2_board *board, struct hm2_flight_head *head);
+HM2_API struct hm2_flight_cycle hm2_board_flight_cycle(const struct hm2_board *board, unsigned index);
+HM2_API void hm2_board_flight_resume(struct hm2_board *board);
 
 /* Payload bytes of the cycle's datagrams and what they hold; after setup. */
 HM2_API struct hm2_plan_sizes hm2_board_sizes(const struct hm2_board *board);
