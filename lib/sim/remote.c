@@ -186,14 +186,20 @@ static void put_ptoc(uint8_t *const memory, const struct remote_kind *const kind
     }
 }
 
-/* Everything is in the global table, process data as well (reference: HAL interface, 4.4). */
+/* Process data is in the global table as well (reference: HAL interface, 4.4). That it is the data of the first mode,
+ * so that no mode makes process data of others look like parameters, is an assumption. */
 static void put_gtoc(uint8_t *const memory, const struct remote_kind *const kind)
 {
     if (kind->no_parameters)
         return;
     unsigned at = kind->layout.gtoc;
-    for (unsigned i = 0; field_at(kind, i); i++, at += 2)
+    const struct remote_field *field;
+    for (unsigned i = 0; (field = field_at(kind, i)); i++) {
+        if (field->modes != 0 && !(field->modes & 1u))
+            continue;
         put(memory, at, record_of(kind, i), 2);
+        at += 2;
+    }
     put(memory, at, kind->layout.modes, 2);
     for (unsigned mode = 0; mode < kind->mode_count; mode++)
         put(memory, at += 2, mode_record(kind, mode), 2);
@@ -211,6 +217,37 @@ static void put_tables(struct remote *const r)
     for (unsigned i = 0; (field = field_at(kind, i)); i++)
         put_field(r->memory, record_of(kind, i), field);
     put_gtoc(r->memory, kind);
+}
+
+/* ---- what fields are now -------------------------------------------------------------------------------------------
+ */
+
+uint8_t remote_faults(const struct remote *const r)
+{
+    return r->memory[REMOTE_AT_FAULT];
+}
+
+/* What an output field does, raw. */
+static uint64_t applied(const struct remote *const r, const struct remote_field *const field)
+{
+    const uint64_t value = get(r->memory, field->address, bytes_of(field->bits)) & mask_of(field->bits);
+    if (remote_faults(r))
+        return 0;
+    return field->address == REMOTE_AT_OUTPUTS && field->type == REMOTE_BITS ? value & ~(uint64_t)r->tripped : value;
+}
+
+/* Inputs as they are now. Pins with open drains: inputs and outputs are paired by their order. */
+static void sample(struct remote *const r)
+{
+    const struct remote_kind *const kind = r->kind;
+    const unsigned pairs = kind->field_count / 2;
+    for (unsigned i = 0; i < kind->field_count; i++) {
+        const struct remote_field *const field = &kind->fields[i];
+        if (field->direction != REMOTE_IN)
+            continue;
+        const uint64_t driven = kind->loopback ? applied(r, &kind->fields[i + pairs]) : 0;
+        put(r->memory, field->address, r->world[i] | driven, bytes_of(field->bits));
+    }
 }
 
 /* ---- life ---------------------------------------------------------------------------------------------------------
@@ -277,6 +314,7 @@ void remote_power_up(struct remote *const r, const int64_t now_ns)
     r->mode = 0;
     r->tripped = 0;
     r->fed_ns = now_ns;
+    sample(r);
 }
 
 /* ---- what LBP commands ask ----------------------------------------------------------------------------------------
@@ -341,11 +379,6 @@ unsigned remote_out_bytes(const struct remote *const r)
     return process_bytes(r, from_host);
 }
 
-uint8_t remote_faults(const struct remote *const r)
-{
-    return r->memory[REMOTE_AT_FAULT];
-}
-
 void remote_clear_faults(struct remote *const r, const uint8_t mask)
 {
     r->memory[REMOTE_AT_FAULT] = (uint8_t)((r->memory[REMOTE_AT_FAULT] & ~mask) | r->held);
@@ -368,15 +401,6 @@ static const struct remote_field *field_outputs(const struct remote_kind *const 
     return field;
 }
 
-/* What an output field does, raw. */
-static uint64_t applied(const struct remote *const r, const struct remote_field *const field)
-{
-    const uint64_t value = get(r->memory, field->address, bytes_of(field->bits)) & mask_of(field->bits);
-    if (remote_faults(r))
-        return 0;
-    return field->address == REMOTE_AT_OUTPUTS && field->type == REMOTE_BITS ? value & ~(uint64_t)r->tripped : value;
-}
-
 /* Shorted outputs trip when they come on. */
 static void look_for_shorts(struct remote *const r)
 {
@@ -390,27 +414,12 @@ static void look_for_shorts(struct remote *const r)
         add_fault(r, REMOTE_FAULT_OVER_CURRENT);
 }
 
-/* Inputs as they are now. Pins with open drains: inputs and outputs are paired by their order. */
-static void sample(struct remote *const r)
-{
-    const struct remote_kind *const kind = r->kind;
-    const unsigned pairs = kind->field_count / 2;
-    for (unsigned i = 0; i < kind->field_count; i++) {
-        const struct remote_field *const field = &kind->fields[i];
-        if (field->direction != REMOTE_IN)
-            continue;
-        const uint64_t driven = kind->loopback ? applied(r, &kind->fields[i + pairs]) : 0;
-        put(r->memory, field->address, r->world[i] | driven, bytes_of(field->bits));
-    }
-}
-
 uint8_t remote_read(struct remote *const r, const uint16_t address)
 {
     if (r->nv_memory) {
         const bool inside = address >= REMOTE_AT_NV && address < REMOTE_AT_NV + REMOTE_NV_BYTES;
         return inside ? r->nv[address - REMOTE_AT_NV] : 0;
     }
-    sample(r);
     return address < REMOTE_MEMORY ? r->memory[address] : 0;
 }
 
@@ -539,6 +548,7 @@ int remote_set(struct remote *const r, const char *const name, const double valu
     if (!isfinite(raw) || (!counts && (raw < least || raw > most_of(field))) || fabs(raw) > 1e15)
         return HM2_ERR_RANGE;
     r->world[index] = (uint64_t)(int64_t)raw & mask_of(field->bits);
+    sample(r);
     if (r->kind->field_power && strcasecmp(field->name, "FieldVoltage") == 0)
         watch_field_power(r, value);
     return 0;

@@ -6,9 +6,9 @@
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
 static const struct remote_field fields[] = {
-    {"P1-IN", "bit", 24, REMOTE_BITS, REMOTE_IN, 1, 0x600, 0, 0},
-    {"P2-IN", "bit", 24, REMOTE_BITS, REMOTE_IN, 1, 0x603, 0, 0},
-    {"P3-IN", "bit", 24, REMOTE_BITS, REMOTE_IN, 1, 0x606, 0, 0},
+    {"P1-In", "bit", 24, REMOTE_BITS, REMOTE_IN, 1, 0x600, 0, 0},
+    {"P2-In", "bit", 24, REMOTE_BITS, REMOTE_IN, 1, 0x603, 0, 0},
+    {"P3-In", "bit", 24, REMOTE_BITS, REMOTE_IN, 1, 0x606, 0, 0},
     {"P1-Out", "bit", 24, REMOTE_BITS, REMOTE_OUT, 1, 0x610, 0, 0},
     {"P2-Out", "bit", 24, REMOTE_BITS, REMOTE_OUT, 1, 0x613, 0, 0},
     {"P3-Out", "bit", 24, REMOTE_BITS, REMOTE_OUT, 1, 0x616, 0, 0},

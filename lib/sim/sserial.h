@@ -16,13 +16,14 @@ int HM2_MUST_CHECK sim_sserial_plug(struct sim_card *card, unsigned port, unsign
                                     uint32_t serial, struct hm2_diag *diag);
 /* The remote at a channel, its time as far as the card's; NULL when there is none. Owned by the card. */
 struct remote *sim_sserial_remote(struct sim_card *card, unsigned port, unsigned channel);
-/* Pull the cable of a channel, or put it back. */
-int HM2_MUST_CHECK sim_sserial_cable(struct sim_card *card, unsigned port, unsigned channel, bool plugged);
+/* The cable of a channel: as it should be, with the line from the remote broken, or pulled. */
+enum sim_cable { SIM_CABLE_IN, SIM_CABLE_ONE_WAY, SIM_CABLE_OUT };
+int HM2_MUST_CHECK sim_sserial_cable(struct sim_card *card, unsigned port, unsigned channel, enum sim_cable cable);
 /* The remote loses its power for a moment. */
 int HM2_MUST_CHECK sim_sserial_power_cycle(struct sim_card *card, unsigned port, unsigned channel);
 
-/* Errors to come on a channel's line, `count` messages in a row: "crc", "cookie" (seen when a port starts), "overrun",
- * "timeout", "extra", "break". INVALID for another name. */
+/* Errors to come on a channel's line, in the answers to the next `count` messages: "crc", "cookie" (seen when a port
+ * starts), "overrun", "timeout", "extra", "break". INVALID for another name. */
 int HM2_MUST_CHECK sim_sserial_error(struct sim_card *card, unsigned port, unsigned channel, const char *error,
                                      unsigned count);
 

@@ -26,7 +26,7 @@
 #define NO_REMOTE_PROBE    41900
 #define NO_REMOTE_SETUP    260500 /* the same in setup mode */
 #define NO_REMOTE_S_PROBE  143300
-#define NO_REMOTE_ATTEMPTS 21
+#define NO_REMOTE_ATTEMPTS (SSERIAL_ERROR_LIMIT + 1)
 
 /* Messages: 10 bits of 2.5 Mbaud and a little, and what the processors on both sides need besides. */
 #define BYTE_CLK       403
@@ -47,20 +47,25 @@
 /* ---- is anybody there? --------------------------------------------------------------------------------------------
  */
 
-/* The remote hears and is heard: plugged, at the same baud rate, and the pins are the port's. */
-static bool connected(struct sim_module *const m, const struct sserial_port *const p, const unsigned channel)
+/* What is sent comes to the remote: it is plugged, at the same baud rate, and the pin is the port's. */
+static bool heard(struct sim_module *const m, const struct sserial_port *const p, const unsigned channel)
 {
     const struct sserial_channel *const c = &p->channels[channel];
-    if (!c->remote || c->cut)
+    if (!c->remote || c->cable == SIM_CABLE_OUT)
         return false;
     uint32_t baud = 0;
     for (unsigned i = 4; i-- > 0;)
         baud = baud << 8 | p->locals[sserial_local(channel, SSERIAL_LOCAL_BAUD + i)];
     if (baud != remote_baud(c->remote))
         return false;
-    if (c->tx_io != UINT_MAX && !sim_pad_carries_alternate(m->card, c->tx_io))
-        return false;
-    return c->rx_io == UINT_MAX || sim_card_pad(m->card, c->rx_io) == SIM_FLOAT;
+    return c->tx_io == UINT_MAX || sim_pad_carries_alternate(m->card, c->tx_io);
+}
+
+/* What it answers comes back. */
+static bool answered(struct sim_module *const m, const struct sserial_channel *const c)
+{
+    const bool free = c->rx_io == UINT_MAX || sim_card_pad(m->card, c->rx_io) == SIM_FLOAT;
+    return free && c->cable == SIM_CABLE_IN;
 }
 
 static void count_up(struct sserial_port *const p, const unsigned channel, const unsigned parameter)
@@ -80,10 +85,10 @@ static void note_error(struct sserial_port *const p, const unsigned channel, con
         count_up(p, channel, SSERIAL_LOCAL_TIMEOUT_COUNT);
     if (error & SSERIAL_CRC)
         count_up(p, channel, SSERIAL_LOCAL_CRC_COUNT);
-    if (c->errors < SSERIAL_ERROR_LIMIT)
-        c->errors++;
     if (c->errors == SSERIAL_ERROR_LIMIT)
         c->local |= SSERIAL_TOO_MANY;
+    else
+        c->errors++;
 }
 
 /* The error that was ordered for the next message: its local fault bit, 0 = none. */
@@ -178,7 +183,7 @@ static bool in_setup(const uint32_t command)
 
 static int64_t no_remote_clk(const bool setup)
 {
-    return NO_REMOTE_FIRST + NO_REMOTE_ATTEMPTS * (int64_t)(setup ? NO_REMOTE_SETUP : NO_REMOTE_CLK);
+    return NO_REMOTE_FIRST + (int64_t)NO_REMOTE_ATTEMPTS * (setup ? NO_REMOTE_SETUP : NO_REMOTE_CLK);
 }
 
 static void start_channel(struct sim_module *const m, struct sserial_port *const p, const unsigned i)
@@ -187,7 +192,7 @@ static void start_channel(struct sim_module *const m, struct sserial_port *const
     reset(c);
     clear_counts(p, i);
     c->link = SSERIAL_FAILED;
-    if (!connected(m, p, i))
+    if (!heard(m, p, i) || !answered(m, c))
         return;
     const uint8_t error = ordered_error(c, SSERIAL_COOKIE);
     if (error)
@@ -359,13 +364,19 @@ static int64_t exchange_clk(const struct sserial_channel *const c)
     return DO_IT_CLK + (int64_t)bytes * BYTE_CLK + (c->link == SSERIAL_READY ? FIRST_MORE_CLK : 0);
 }
 
-static void exchange(struct sserial_channel *const c, const unsigned users, const int64_t now_ns)
+/* The remote takes its outputs and answers. */
+static void exchange(const struct sserial_channel *const c, const unsigned users, const int64_t now_ns,
+                     uint8_t *const in)
 {
-    uint8_t out[REMOTE_MAX_BYTES] = {0}, in[REMOTE_MAX_BYTES + 1] = {0};
-    const unsigned in_bytes = remote_in_bytes(c->remote);
+    uint8_t out[REMOTE_MAX_BYTES] = {0};
     for (unsigned i = 0; i < users * 4 && i < sizeof out; i++)
         out[i] = (uint8_t)(c->user_out[i / 4] >> 8 * (i % 4));
     remote_exchange(c->remote, now_ns, out, in);
+}
+
+static void show_inputs(struct sserial_channel *const c, const unsigned users, const uint8_t *const in)
+{
+    const unsigned in_bytes = remote_in_bytes(c->remote);
     for (unsigned i = 0; i < users; i++)
         c->user_in[i] = 0;
     for (unsigned i = 0; i < in_bytes && i < users * 4; i++)
@@ -434,20 +445,23 @@ static bool takes_part(const struct sserial_channel *const c)
     return c->link == SSERIAL_READY || c->link == SSERIAL_RUNNING || c->link == SSERIAL_SETUP;
 }
 
-/* Decided now, reported when the message has ended: c->pending. */
+/* Decided now, reported when the message has ended: c->pending. Ordered errors hit what comes back: the remote has done
+ * what it was told. */
 static int64_t send(struct sim_module *const m, struct sserial_port *const p, const unsigned i, const int64_t clk)
 {
     struct sserial_channel *const c = &p->channels[i];
     const uint8_t errors = (uint8_t)~SSERIAL_COOKIE;
     if (c->link == SSERIAL_SETUP && c->cs_out >> LBP_SHIFT == 0) {
-        c->pending = 0; /* nothing is sent */
+        c->pending = 0;
+        c->reached = true; /* nothing is sent */
         return SHORT_CLK;
     }
-    c->pending = connected(m, p, i) ? ordered_error(c, errors) : SSERIAL_TIMEOUT;
+    c->reached = heard(m, p, i);
+    c->pending = c->reached && answered(m, c) ? ordered_error(c, errors) : SSERIAL_TIMEOUT;
+    if (c->reached && c->link == SSERIAL_READY)
+        remote_feed(c->remote, sserial_ns(m, clk)); /* it was kept alive until now */
     if (c->pending & SSERIAL_TIMEOUT)
         return (int64_t)p->locals[sserial_local(i, SSERIAL_LOCAL_TIMEOUT)] * 200 - 10;
-    if (c->link == SSERIAL_READY)
-        remote_feed(c->remote, sserial_ns(m, clk));
     return c->link == SSERIAL_SETUP ? lbp_clk(c->cs_out) : exchange_clk(c);
 }
 
@@ -468,15 +482,18 @@ int64_t sserial_do_it(struct sim_module *const m, struct sserial_port *const p, 
 static bool receive(struct sim_module *const m, struct sserial_port *const p, const unsigned i, const int64_t clk)
 {
     struct sserial_channel *const c = &p->channels[i];
+    uint8_t in[REMOTE_MAX_BYTES + 1] = {0};
+    if (c->reached && c->link != SSERIAL_SETUP)
+        exchange(c, p->users, sserial_ns(m, clk), in);
+    else if (c->reached)
+        remote_feed(c->remote, sserial_ns(m, clk));
     if (c->pending) {
         note_error(p, i, c->pending);
         return false;
     }
-    if (c->link == SSERIAL_SETUP) {
-        remote_feed(c->remote, sserial_ns(m, clk));
+    if (c->link == SSERIAL_SETUP)
         return pass_on(c);
-    }
-    exchange(c, p->users, sserial_ns(m, clk));
+    show_inputs(c, p->users, in);
     return c->faults == 0;
 }
 
@@ -510,7 +527,7 @@ static int64_t clk_of(const struct sim_module *const m, const int64_t ns)
 /* After a START the firmware sends zeros to the remote until the first DOIT comes (seed 003, "NORMAL START"). */
 static bool kept_alive(const struct sserial_channel *const c)
 {
-    return c->link == SSERIAL_READY && !c->cut;
+    return c->link == SSERIAL_READY && c->cable != SIM_CABLE_OUT;
 }
 
 int64_t sserial_next_bite(const struct sim_module *const m, const struct sserial_port *const p)

@@ -35,7 +35,7 @@ enum sserial_link { SSERIAL_STOPPED, SSERIAL_READY, SSERIAL_RUNNING, SSERIAL_SET
 
 struct sserial_channel {
     struct remote *remote;
-    bool cut;              /* the cable */
+    enum sim_cable cable;
     unsigned tx_io, rx_io; /* UINT_MAX: the firmware brings it to no pin, the remote sits at the module itself */
     unsigned ordered[SSERIAL_ERRORS];
     /* The firmware's side */
@@ -43,6 +43,7 @@ struct sserial_channel {
     uint8_t faults, state, status, local; /* bytes 3..0 of the CS register */
     uint32_t user_in[SSERIAL_USERS];      /* as the host reads them */
     uint8_t errors;
+    bool reached;    /* the message on its way comes to the remote */
     uint8_t pending; /* error of the message on its way: a local fault bit */
     bool stale;      /* CS is reset when the next command comes */
     bool fresh;      /* no DOIT since START */

@@ -77,12 +77,12 @@ static bool do_terminal(const struct order *const o)
 
 static bool do_pull(const struct order *const o)
 {
-    return sim_sserial_cable(o->card, o->port, o->channel, false) == 0;
+    return sim_sserial_cable(o->card, o->port, o->channel, SIM_CABLE_OUT) == 0;
 }
 
 static bool do_plug(const struct order *const o)
 {
-    return sim_sserial_cable(o->card, o->port, o->channel, true) == 0;
+    return sim_sserial_cable(o->card, o->port, o->channel, SIM_CABLE_IN) == 0;
 }
 
 static bool do_power_cycle(const struct order *const o)
