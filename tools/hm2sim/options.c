@@ -13,6 +13,8 @@
 
 #include <hm2/lbp16.h>
 
+#include "sserial.h"
+
 #define NS_PER_S              1e9
 #define NS_PER_MS             1e6
 #define NS_PER_US             1e3
@@ -20,6 +22,8 @@
 #define DEFAULT_PRIORITY      50
 #define ADDRESS_CHARACTERS    32
 #define MAX_PATTERN_PERIOD_MS 1e6
+#define MAX_TIME_CONSTANT_MS  1e5
+#define MS_PER_S              1e3
 
 /* ---- numbers ------------------------------------------------------------------------------------------------------
  */
@@ -317,6 +321,66 @@ static int add_pattern(struct reading *const r, const char *const value)
     return 0;
 }
 
+static const char *find_name(const char *const *names, const char *const name)
+{
+    for (; *names; names++)
+        if (strcmp(*names, name) == 0)
+            return *names;
+    return NULL;
+}
+
+/* PORT:CHANNEL=CARD */
+static int add_remote(struct reading *const r, const char *const value)
+{
+    static const char wanted[] = "PORT:CHANNEL=CARD, such as 0:0=7i77, with a card that hm2sim --help lists";
+    unsigned long port, channel;
+    const char *at;
+    if (!read_unsigned(value, UINT8_MAX, &at, &port) || *at != ':' ||
+        !read_unsigned(at + 1, UINT8_MAX, &at, &channel) || *at != '=')
+        return refuse(r, "--remote", value, wanted);
+    const char *card = find_name(sim_sserial_cards(), at + 1);
+    if (!card)
+        card = find_name(remote_names(), at + 1);
+    if (!card)
+        return refuse(r, "--remote", value, wanted);
+    if (r->card->remote_count == MAX_REMOTES)
+        return refuse(r, "--remote", value, "at most 32 remotes a card");
+    r->card->remotes[r->card->remote_count++] = (struct remote_option){(unsigned)port, (unsigned)channel, card};
+    return 0;
+}
+
+/* ENCODER:PORT:CHANNEL:OUTPUT:COUNTS[:MS] */
+static int add_servo(struct reading *const r, const char *const value)
+{
+    static const char wanted[] =
+        "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS[:MILLISECONDS], such as 0:0:1:AnalogOut0:100000:20";
+    struct servo s = {.time_constant_s = 0};
+    unsigned long encoder, port, channel;
+    long counts;
+    double ms = 0;
+    const char *at;
+    if (!read_unsigned(value, UINT8_MAX, &at, &encoder) || *at != ':' ||
+        !read_unsigned(at + 1, UINT8_MAX, &at, &port) || *at != ':' ||
+        !read_unsigned(at + 1, UINT8_MAX, &at, &channel) || *at != ':')
+        return refuse(r, "--servo", value, wanted);
+    const size_t len = strcspn(++at, ":");
+    if (len == 0 || len >= sizeof s.output || at[len] != ':')
+        return refuse(r, "--servo", value, wanted);
+    memcpy(s.output, at, len);
+    if (!read_signed(at + len + 1, INT32_MAX, &at, &counts) || (*at != ':' && *at != '\0') ||
+        (*at == ':' && !whole_real(at + 1, 0, MAX_TIME_CONSTANT_MS, &ms)))
+        return refuse(r, "--servo", value, wanted);
+    if (r->card->servo_count == MAX_WIRES)
+        return refuse(r, "--servo", value, "at most 32 servos a card");
+    s.encoder = (unsigned)encoder;
+    s.port = (unsigned)port;
+    s.channel = (unsigned)channel;
+    s.counts_per_s = (int32_t)counts;
+    s.time_constant_s = ms / MS_PER_S;
+    r->card->servos[r->card->servo_count++] = s;
+    return 0;
+}
+
 /* ---- faults -------------------------------------------------------------------------------------------------------
  */
 
@@ -381,6 +445,8 @@ enum {
     OPT_INDEX,
     OPT_SWITCH,
     OPT_DRIVE,
+    OPT_REMOTE,
+    OPT_SERVO,
     OPT_MAC,
     OPT_LATENCY,
     OPT_REALTIME,
@@ -405,6 +471,8 @@ static const struct option long_options[] = {
     {"index", required_argument, NULL, OPT_INDEX},
     {"switch", required_argument, NULL, OPT_SWITCH},
     {"drive", required_argument, NULL, OPT_DRIVE},
+    {"remote", required_argument, NULL, OPT_REMOTE},
+    {"servo", required_argument, NULL, OPT_SERVO},
     {"mac", required_argument, NULL, OPT_MAC},
     {"latency", no_argument, NULL, OPT_LATENCY},
     {"realtime", optional_argument, NULL, OPT_REALTIME},
@@ -449,9 +517,17 @@ static void print_help(void)
           "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
           "  --switch IO:AXIS:POSITION:LEVELS  below the position of stepgen.N or encoder.N one level, then another\n"
           "  --drive IO:LEVELS[:MS]  0, 1, z (floating), h (pulled up), MS milliseconds each\n"
-          "\n"
-          "When all cards listen, one line \"ready CARD@ADDRESS:PORT ...\" is printed. SIGINT and SIGTERM end it.\n",
+          "  --remote PORT:CHANNEL=CARD  a smart-serial card there. Cards:",
           stdout);
+    for (const char *const *card = sim_sserial_cards(); *card; card++)
+        printf(" %s", *card);
+    fputs(
+        "\n"
+        "  --servo ENC:PORT:CHANNEL:OUTPUT:COUNTS[:MS]  a motor at a remote's analog output, COUNTS a second at full\n"
+        "                      output, with a time constant\n"
+        "\n"
+        "When all cards listen, one line \"ready CARD@ADDRESS:PORT ...\" is printed. SIGINT and SIGTERM end it.\n",
+        stdout);
 }
 
 static int take_seconds(struct reading *const r, const char *const option, const char *const value,
@@ -501,6 +577,10 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_index(r, value);
     case OPT_SWITCH:
         return add_switch(r, value);
+    case OPT_REMOTE:
+        return add_remote(r, value);
+    case OPT_SERVO:
+        return add_servo(r, value);
     default:
         return add_pattern(r, value);
     }
