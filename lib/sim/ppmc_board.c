@@ -200,6 +200,13 @@ void ppmc_board_write(struct ppmc_board *const board, const unsigned offset, con
         board->stats->undocumented++;
 }
 
+bool ppmc_board_is_held(const struct ppmc_board *const board, const unsigned offset, const bool line)
+{
+    const bool master = board->registers.timer & TIMER_MASTER;
+    const bool old = !has_preset_register(board); /* its holding registers may be latched by an index */
+    return offset < READ_INDEX_SENSE && line == board->line_seen && !master && !old;
+}
+
 static uint8_t read_sense(struct ppmc_board *const board)
 {
     unsigned sense = 0;

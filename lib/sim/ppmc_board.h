@@ -31,6 +31,8 @@ bool ppmc_board_owns(const struct ppmc_board *board, uint8_t address);
 bool ppmc_board_drives_line(const struct ppmc_board *board);
 /* Time passes with the latch line at this level. */
 void ppmc_board_advance(struct ppmc_board *board, int64_t to_ns, bool line);
+/* Does what this register reads not depend on the time? Then the board need not be brought up to it. */
+bool ppmc_board_is_held(const struct ppmc_board *board, unsigned offset, bool line);
 /* Registers, by offset from the board's base. The board's time must be the present. */
 void ppmc_board_write(struct ppmc_board *board, unsigned offset, uint8_t value);
 uint8_t ppmc_board_read(struct ppmc_board *board, unsigned offset);

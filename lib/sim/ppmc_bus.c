@@ -31,6 +31,18 @@ void sim_ppmc_free(struct sim_ppmc *const bus)
     free(bus);
 }
 
+static void map_boards(struct sim_ppmc *const bus)
+{
+    bus->powered = false;
+    for (unsigned slot = 0; slot < SIM_PPMC_SLOTS; slot++) {
+        bus->at[slot] = NULL;
+        for (unsigned i = 0; i < SIM_PPMC_SLOTS; i++)
+            if (ppmc_board_owns(&bus->boards[i], (uint8_t)(slot * REGISTERS_OF_SLOT)))
+                bus->at[slot] = &bus->boards[i];
+        bus->powered = bus->powered || bus->at[slot];
+    }
+}
+
 int sim_ppmc_add(struct sim_ppmc *const bus, const unsigned slot, const uint8_t id)
 {
     struct ppmc_board board;
@@ -40,11 +52,11 @@ int sim_ppmc_add(struct sim_ppmc *const bus, const unsigned slot, const uint8_t 
     if (board.slots == 2 && slot % 2 != 0)
         return HM2_ERR_RANGE;
     for (unsigned i = slot; i < slot + board.slots; i++)
-        for (unsigned k = 0; k < SIM_PPMC_SLOTS; k++)
-            if (ppmc_board_owns(&bus->boards[k], (uint8_t)(i * REGISTERS_OF_SLOT)))
-                return HM2_ERR_STATE;
+        if (bus->at[i])
+            return HM2_ERR_STATE;
     ppmc_board_advance(&board, bus->now_ns, false);
     bus->boards[slot] = board;
+    map_boards(bus);
     return 0;
 }
 
@@ -81,12 +93,9 @@ static void look_at_line(struct sim_ppmc *const bus)
 
 /* ---- cycles ------------------------------------------------------------------------------------------------------ */
 
-static struct ppmc_board *selected(struct sim_ppmc *const bus)
+static struct ppmc_board *selected(const struct sim_ppmc *const bus)
 {
-    for (unsigned i = 0; i < SIM_PPMC_SLOTS; i++)
-        if (ppmc_board_owns(&bus->boards[i], bus->address))
-            return &bus->boards[i];
-    return NULL;
+    return bus->at[bus->address / REGISTERS_OF_SLOT];
 }
 
 static enum sim_ppmc_fault fault_of_cycle(struct sim_ppmc *const bus)
@@ -146,7 +155,8 @@ static bool data_cycle(struct sim_ppmc *const bus, const bool reads, const enum 
     struct ppmc_board *const board = selected(bus);
     if (!board)
         return nobody_answers(bus, reads, byte);
-    bring_up_to_date(bus, board);
+    if (!reads || !ppmc_board_is_held(board, bus->address - board->slot * REGISTERS_OF_SLOT, bus->line))
+        bring_up_to_date(bus, board);
     if (reads) {
         read_byte(bus, board, fault, byte);
     } else {
@@ -177,14 +187,6 @@ static bool address_cycle(struct sim_ppmc *const bus, const bool reads, uint8_t 
     return true;
 }
 
-static bool powered(const struct sim_ppmc *const bus)
-{
-    for (unsigned i = 0; i < SIM_PPMC_SLOTS; i++)
-        if (bus->boards[i].present && bus->boards[i].powered)
-            return true;
-    return false;
-}
-
 bool sim_ppmc_cycle(struct sim_ppmc *const bus, const enum epp_kind kind, uint8_t *const byte)
 {
     const bool reads = kind == EPP_ADDRESS_READ || kind == EPP_DATA_READ;
@@ -194,7 +196,7 @@ bool sim_ppmc_cycle(struct sim_ppmc *const bus, const enum epp_kind kind, uint8_
     if (fault < SIM_PPMC_FAULTS)
         bus->stats.faults[fault]++;
     /* Any board that has power takes part in an address cycle; with none there is no handshake. */
-    if (bus->unplugged || fault == SIM_PPMC_FAULT_TIMEOUT || !powered(bus))
+    if (bus->unplugged || fault == SIM_PPMC_FAULT_TIMEOUT || !bus->powered)
         return nobody_answers(bus, reads, byte);
     return kind == EPP_ADDRESS_WRITE || kind == EPP_ADDRESS_READ ? address_cycle(bus, reads, byte)
                                                                  : data_cycle(bus, reads, fault, byte);
@@ -314,6 +316,7 @@ void sim_ppmc_power(struct sim_ppmc *const bus, const unsigned slot, const bool 
         return;
     board->powered = on;
     ppmc_board_reset(board);
+    map_boards(bus);
     look_at_line(bus);
 }
 

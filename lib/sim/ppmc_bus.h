@@ -17,6 +17,8 @@ struct sim_ppmc {
     struct sim_ppmc_stats stats;
     int64_t now_ns;
     struct ppmc_board boards[SIM_PPMC_SLOTS]; /* by their slot */
+    struct ppmc_board *at[SIM_PPMC_SLOTS];    /* that answers at each slot, or NULL */
+    bool powered;                             /* at least one */
     uint8_t address, residue;
     bool line; /* of the latch pulse, which all boards share (ppmc.md section 2.4) */
     bool unplugged;
