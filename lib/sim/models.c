@@ -2,11 +2,14 @@
 /* Every module model of the simulated card, one line each. */
 #include "sim_card.h"
 
+extern const struct sim_module_ops sim_bspi_ops;
+extern const struct sim_module_ops sim_dbspi_ops;
 extern const struct sim_module_ops sim_encoder_ops;
 extern const struct sim_module_ops sim_hm2dpll_ops;
 extern const struct sim_module_ops sim_inm_ops;
 extern const struct sim_module_ops sim_inmux_ops;
 extern const struct sim_module_ops sim_outm_ops;
+extern const struct sim_module_ops sim_spi_ops;
 extern const struct sim_module_ops sim_ssr_ops;
 extern const struct sim_module_ops sim_ioport_ops;
 extern const struct sim_module_ops sim_irq_ops;
@@ -15,6 +18,8 @@ extern const struct sim_module_ops sim_muxed_encoder_ops;
 extern const struct sim_module_ops sim_muxed_select_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
+extern const struct sim_module_ops sim_uart_rx_ops;
+extern const struct sim_module_ops sim_uart_tx_ops;
 extern const struct sim_module_ops sim_watchdog_ops;
 
 const struct sim_module_ops *const sim_models[] = {
@@ -32,5 +37,10 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_inmux_ops,         /* 1E */
     &sim_outm_ops,          /* 2D */
     &sim_ssr_ops,           /* C3 */
+    &sim_bspi_ops,          /* 0E */
+    &sim_dbspi_ops,         /* 0F */
+    &sim_spi_ops,           /* 07 */
+    &sim_uart_tx_ops,       /* 09 */
+    &sim_uart_rx_ops,       /* 0A */
     NULL,
 };
