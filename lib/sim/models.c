@@ -16,6 +16,8 @@ extern const struct sim_module_ops sim_irq_ops;
 extern const struct sim_module_ops sim_led_ops;
 extern const struct sim_module_ops sim_muxed_encoder_ops;
 extern const struct sim_module_ops sim_muxed_select_ops;
+extern const struct sim_module_ops sim_pktuart_rx_ops;
+extern const struct sim_module_ops sim_pktuart_tx_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_uart_rx_ops;
@@ -42,5 +44,7 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_spi_ops,           /* 07 */
     &sim_uart_tx_ops,       /* 09 */
     &sim_uart_rx_ops,       /* 0A */
+    &sim_pktuart_tx_ops,    /* 1B */
+    &sim_pktuart_rx_ops,    /* 1C */
     NULL,
 };

@@ -170,6 +170,8 @@ void replay_spi_edge(struct replay_run *run, int64_t clk, unsigned watch, enum s
 int replay_spi_word(struct replay_run *run, const struct replay_event *event);
 
 /* Bench of the serial recordings. */
+int replay_serial_inputs(const struct replay_trace *trace, const struct replay_test *test,
+                         struct replay_event_list *out);
 int replay_serial_prepare(struct replay_run *run);
 void replay_serial_edge(struct replay_run *run, int64_t clk, unsigned watch, enum sim_level level);
 

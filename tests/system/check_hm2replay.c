@@ -119,7 +119,7 @@ int main(void)
     TCase *const tests = tcase_create("hm2replay");
     tcase_set_timeout(tests, 2.0 * END_MS / 1000.0);
     tcase_add_checked_fixture(tests, make_folder, remove_folder);
-    tcase_add_loop_test(tests, every_recorded_folder_passes, 0, 13);
+    tcase_add_loop_test(tests, every_recorded_folder_passes, 0, 15);
     tcase_add_test(tests, a_difference_is_printed_and_makes_the_exit_status);
     tcase_add_test(tests, a_folder_of_no_kind_is_named_with_the_known_ones);
     tcase_add_test(tests, a_broken_table_is_refused_with_its_line);
