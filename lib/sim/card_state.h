@@ -61,7 +61,6 @@ struct sim_card {
 
 /* card.c */
 void sim_sync(struct sim_module *m); /* advance to the card's present clk */
-struct sim_module *sim_module_of(struct sim_card *card, uint8_t gtag);
 
 /* pins.c */
 void sim_pins_connect(struct sim_card *card); /* once, when all modules are there */

@@ -2,21 +2,28 @@
 /* Every module model of the simulated card, one line each. */
 #include "sim_card.h"
 
+extern const struct sim_module_ops sim_bspi_ops;
+extern const struct sim_module_ops sim_dbspi_ops;
 extern const struct sim_module_ops sim_encoder_ops;
 extern const struct sim_module_ops sim_hm2dpll_ops;
 extern const struct sim_module_ops sim_inm_ops;
 extern const struct sim_module_ops sim_inmux_ops;
 extern const struct sim_module_ops sim_outm_ops;
+extern const struct sim_module_ops sim_spi_ops;
 extern const struct sim_module_ops sim_ssr_ops;
 extern const struct sim_module_ops sim_ioport_ops;
 extern const struct sim_module_ops sim_irq_ops;
 extern const struct sim_module_ops sim_led_ops;
 extern const struct sim_module_ops sim_muxed_encoder_ops;
 extern const struct sim_module_ops sim_muxed_select_ops;
+extern const struct sim_module_ops sim_pktuart_rx_ops;
+extern const struct sim_module_ops sim_pktuart_tx_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_sserial_ops;
 extern const struct sim_module_ops sim_sserialb_ops;
+extern const struct sim_module_ops sim_uart_rx_ops;
+extern const struct sim_module_ops sim_uart_tx_ops;
 extern const struct sim_module_ops sim_watchdog_ops;
 
 const struct sim_module_ops *const sim_models[] = {
@@ -36,5 +43,12 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_ssr_ops,           /* C3 */
     &sim_sserial_ops,       /* C1 */
     &sim_sserialb_ops,      /* C6 */
+    &sim_bspi_ops,          /* 0E */
+    &sim_dbspi_ops,         /* 0F */
+    &sim_spi_ops,           /* 07 */
+    &sim_uart_tx_ops,       /* 09 */
+    &sim_uart_rx_ops,       /* 0A */
+    &sim_pktuart_tx_ops,    /* 1B */
+    &sim_pktuart_rx_ops,    /* 1C */
     NULL,
 };

@@ -164,6 +164,82 @@ static const struct replay_vector hm2dpll_vectors[] = {
     {NULL, NULL, 0, false},
 };
 
+/* ---- bspi, dbspi, spi ----------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register bspi_registers[] = {
+    {"fifo", 0x5400, 4},
+    {"descr", 0x5500, 0},
+    {"count", 0x5600, 0},
+    {NULL, 0, 0},
+};
+
+static const struct replay_signal bspi_signals[] = {
+    {"frame", REPLAY_OUTPUT, HM2_GTAG_BSPI, 0x81, 0}, {"mosi", REPLAY_OUTPUT, HM2_GTAG_BSPI, 0x82, 0},
+    {"sclk", REPLAY_OUTPUT, HM2_GTAG_BSPI, 0x83, 0},  {"miso", REPLAY_INPUT, HM2_GTAG_BSPI, 0x04, 0},
+    {"cs0", REPLAY_OUTPUT, HM2_GTAG_BSPI, 0x85, 0},   {"cs1", REPLAY_OUTPUT, HM2_GTAG_BSPI, 0x86, 0},
+    {"cs2", REPLAY_OUTPUT, HM2_GTAG_BSPI, 0x87, 0},   {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+static const struct replay_register dbspi_registers[] = {
+    {"fifo0_1", 0x5740, 0}, {"count_1", 0x5904, 0}, {"fifo", 0x5700, 4},
+    {"descr", 0x5800, 0},   {"count", 0x5900, 0},   {NULL, 0, 0},
+};
+
+static const struct replay_signal dbspi_signals[] = {
+    {"mosi", REPLAY_OUTPUT, HM2_GTAG_DBSPI, 0x82, 0},
+    {"sclk", REPLAY_OUTPUT, HM2_GTAG_DBSPI, 0x83, 0},
+    {"miso", REPLAY_INPUT, HM2_GTAG_DBSPI, 0x04, 0},
+    {"cs0", REPLAY_OUTPUT, HM2_GTAG_DBSPI, 0x85, 0},
+    {"cs1", REPLAY_OUTPUT, HM2_GTAG_DBSPI, 0x86, 0},
+    {"cs2", REPLAY_OUTPUT, HM2_GTAG_DBSPI, 0x87, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+static const struct replay_register spi_registers[] = {
+    {"data", 0x5000, 4},
+    {"mode", 0x5100, 4},
+    {"rate", 0x5200, 4},
+    {NULL, 0, 0},
+};
+
+static const struct replay_signal spi_signals[] = {
+    {"frame", REPLAY_OUTPUT, HM2_GTAG_SPI, 0x81, 0},
+    {"mosi", REPLAY_OUTPUT, HM2_GTAG_SPI, 0x82, 0},
+    {"sclk", REPLAY_OUTPUT, HM2_GTAG_SPI, 0x83, 0},
+    {"miso", REPLAY_INPUT, HM2_GTAG_SPI, 0x04, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+/* ---- uart, pktuart -------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register uart_registers[] = {
+    {"txdata1", 0x6000, 0}, {"txdata2", 0x6004, 0}, {"txdata3", 0x6008, 0}, {"txdata4", 0x600C, 0},
+    {"txcount", 0x6100, 0}, {"txrate", 0x6200, 0},  {"txmode", 0x6300, 0},  {"rxdata1", 0x6400, 0},
+    {"rxdata2", 0x6404, 0}, {"rxdata3", 0x6408, 0}, {"rxdata4", 0x640C, 0}, {"rxcount", 0x6500, 0},
+    {"rxrate", 0x6600, 0},  {"rxmode", 0x6700, 0},  {NULL, 0, 0},
+};
+
+static const struct replay_signal uart_signals[] = {
+    {"tx", REPLAY_OUTPUT, HM2_GTAG_UART_TX, 0x81, 0},
+    {"txen", REPLAY_OUTPUT, HM2_GTAG_UART_TX, 0x82, 0},
+    {"rx", REPLAY_INPUT, HM2_GTAG_UART_RX, 0x01, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+static const struct replay_register pktuart_registers[] = {
+    {"txdata", 0x6000, 4},  {"txcount", 0x6100, 4}, {"txrate", 0x6200, 4}, {"txmode", 0x6300, 4}, {"rxdata", 0x6400, 4},
+    {"rxcount", 0x6500, 4}, {"rxrate", 0x6600, 4},  {"rxmode", 0x6700, 4}, {NULL, 0, 0},
+};
+
+static const struct replay_signal pktuart_signals[] = {
+    {"tx", REPLAY_OUTPUT, HM2_GTAG_PKTUART_TX, 0x81, 0},
+    {"txen", REPLAY_OUTPUT, HM2_GTAG_PKTUART_TX, 0x82, 0},
+    {"rx", REPLAY_INPUT, HM2_GTAG_PKTUART_RX, 0x01, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
 /* ---- before a test
  * ---------------------------------------------------------------------------------------------------- */
 
@@ -245,6 +321,59 @@ const struct replay_kind replay_kinds[] = {
      .prepare = replay_sslbp_prepare,
      .before_event = replay_sslbp_event,
      .make_inputs = replay_sslbp_polls},
+    {.folder = "bspi",
+     .firmware = "2X7I65_72",
+     .profile = "7i80hd-16",
+     .registers = bspi_registers,
+     .signals = bspi_signals,
+     .prepare = replay_spi_prepare,
+     .before_event = replay_spi_word,
+     .on_edge = replay_spi_edge,
+     .loop_gtag = HM2_GTAG_BSPI},
+    {.folder = "dbspi",
+     .firmware = "SVSPD6_2_48",
+     .profile = "7i93",
+     .registers = dbspi_registers,
+     .signals = dbspi_signals,
+     .prepare = replay_spi_prepare,
+     .before_event = replay_spi_word,
+     .on_edge = replay_spi_edge,
+     .loop_gtag = HM2_GTAG_DBSPI},
+    {.folder = "spi",
+     .firmware = "SVSP4_6_7I46NA_48",
+     .profile = "7i93",
+     .registers = spi_registers,
+     .signals = spi_signals,
+     .prepare = replay_spi_prepare,
+     .before_event = replay_spi_word,
+     .on_edge = replay_spi_edge,
+     .loop_gtag = HM2_GTAG_SPI},
+    {.folder = "uart",
+     .firmware = "SVUA8_8_72",
+     .profile = "7i80hd-16",
+     .registers = uart_registers,
+     .signals = uart_signals,
+     .prepare = replay_serial_prepare,
+     .on_edge = replay_serial_edge,
+     .loop_gtag = HM2_GTAG_UART_TX},
+    {.folder = "pktuart",
+     .firmware = "PKTUART_0",
+     .profile = "7i80hd-16",
+     .registers = pktuart_registers,
+     .signals = pktuart_signals,
+     .prepare = replay_serial_prepare,
+     .on_edge = replay_serial_edge,
+     .make_inputs = replay_serial_inputs,
+     .loop_gtag = HM2_GTAG_PKTUART_TX},
+    {.folder = "pktuart_new",
+     .firmware = "PKTUART_1",
+     .profile = "7i80hd-16",
+     .registers = pktuart_registers,
+     .signals = pktuart_signals,
+     .prepare = replay_serial_prepare,
+     .on_edge = replay_serial_edge,
+     .make_inputs = replay_serial_inputs,
+     .loop_gtag = HM2_GTAG_PKTUART_TX},
     {.folder = "idrom", .extra = replay_idrom, .no_events = true},
     {.folder = "lbp16", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_lbp16, .no_events = true},
 };

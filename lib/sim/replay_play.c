@@ -126,6 +126,8 @@ static void on_edge(void *const context, const int64_t clk, const unsigned ps, c
     struct replay_run *const run = context;
     if (++run->edges_seen > REPLAY_MAX_EVENTS)
         replay_differs(run, "clk %lld: more than %u edges", (long long)clk, REPLAY_MAX_EVENTS);
+    if (run->kind->on_edge)
+        run->kind->on_edge(run, clk, number, level);
     for (unsigned i = 0; i < run->watch_count; i++) {
         struct replay_watch *const watch = &run->watches[i];
         if (watch->number != (int)number)

@@ -90,6 +90,9 @@ struct replay_kind {
     int (*before_event)(struct replay_run *run, const struct replay_event *event);
     /* Input events that the recording does not have but its other events tell. May be NULL. */
     int (*make_inputs)(const struct replay_trace *trace, const struct replay_test *test, struct replay_event_list *out);
+    /* What the bench did at the edges of outputs that prepare() watches. May be NULL. */
+    void (*on_edge)(struct replay_run *run, int64_t clk, unsigned watch, enum sim_level level);
+    uint8_t loop_gtag; /* module whose output the bench led back to its input */
     /* The recording of output edges ends somewhere: edges after the last recorded one are not compared. */
     bool edges_end_early;
     /* Whole folder in another way than tests.csv and events.csv; runs in addition when those exist. May be NULL. */
@@ -110,6 +113,7 @@ const struct replay_signal *replay_find_signal(const struct replay_kind *kind, c
 /* ---- one test being played --------------------------------------------------------------------------------------- */
 
 #define REPLAY_MAX_WATCHES 64u
+#define REPLAY_BENCH_PINS  3u
 #define REPLAY_TEXT        256u
 
 struct replay_watch {
@@ -135,6 +139,8 @@ struct replay_run {
     size_t *edge_indices;
     int vector_watches[REPLAY_MAX_WATCHES]; /* element by element, vectors in the order of the kind's table */
     uint64_t state[8];                      /* for before_event: zero at the start of a test */
+    int bench_watch[REPLAY_BENCH_PINS];     /* for prepare and on_edge */
+    enum sim_level bench_level[REPLAY_BENCH_PINS];
     char difference[REPLAY_TEXT];
 };
 
@@ -161,6 +167,16 @@ int replay_muxed_inputs(const struct replay_trace *trace, const struct replay_te
 int replay_sslbp_prepare(struct replay_run *run);
 int replay_sslbp_event(struct replay_run *run, const struct replay_event *event);
 int replay_sslbp_polls(const struct replay_trace *trace, const struct replay_test *test, struct replay_event_list *out);
+/* Benches of the SPI recordings. */
+int replay_spi_prepare(struct replay_run *run);
+void replay_spi_edge(struct replay_run *run, int64_t clk, unsigned watch, enum sim_level level);
+int replay_spi_word(struct replay_run *run, const struct replay_event *event);
+
+/* Bench of the serial recordings. */
+int replay_serial_inputs(const struct replay_trace *trace, const struct replay_test *test,
+                         struct replay_event_list *out);
+int replay_serial_prepare(struct replay_run *run);
+void replay_serial_edge(struct replay_run *run, int64_t clk, unsigned watch, enum sim_level level);
 
 /* Result of one test to the caller. */
 void replay_report(const struct replay_options *options, struct replay_totals *totals, const char *test,

@@ -8,6 +8,7 @@
 #define SIM_NEVER INT64_MAX
 
 struct sim_module;
+struct serial_feed;
 
 /*
  * One kind of module. `clk` below is always card time: advance(m, clk) makes all edges before clk happen, in closed
@@ -44,6 +45,10 @@ struct sim_module_ops {
      * instead of next_event when not NULL. Called with m->clk == from, before advance(m, to); changes nothing. */
     void (*trace)(struct sim_module *m, unsigned unit, uint8_t secondary_pin, int64_t from, int64_t to,
                   void (*report)(void *context, int64_t clk, unsigned ps, enum sim_level level), void *context);
+    /* Serial modules: who is told of each byte sent (transmitter), and where bytes from outside wait (receiver; NULL
+     * when there is no such unit). */
+    void (*serial_attach)(struct sim_module *m, unsigned unit, sim_serial_fn sent, void *context);
+    struct serial_feed *(*serial_feed)(struct sim_module *m, unsigned unit);
     void (*bite)(struct sim_module *m); /* the watchdog bit: outputs that it clears. May be NULL */
 };
 
@@ -70,6 +75,8 @@ uint32_t sim_clock_high_hz(const struct sim_card *card);
 const struct hm2_idrom *sim_idrom(const struct sim_card *card);
 /* First module with this tag, or NULL; advanced to the card's present clk. */
 struct sim_module *sim_find(struct sim_card *card, uint8_t gtag);
+/* The same, as far advanced as it is: for models that advance together. */
+struct sim_module *sim_module_of(struct sim_card *card, uint8_t gtag);
 /* The card's present clk (edges before it have been made). */
 int64_t sim_now(const struct sim_card *card);
 /* The watchdog bites now (called from its advance(), while it makes the edge at which the outputs go): every module's

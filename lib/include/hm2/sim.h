@@ -97,6 +97,19 @@ HM2_API int HM2_MUST_CHECK sim_card_index(struct sim_card *card, unsigned encode
  */
 HM2_API int HM2_MUST_CHECK sim_card_turned(struct sim_card *card, uint8_t gtag, unsigned unit, int64_t *position);
 
+/* ---- serial ports ------------------------------------------------------------------------------------------------ */
+
+/* A byte has left a transmitter, up to the middle of its stop bit. */
+typedef void (*sim_serial_fn)(void *context, uint8_t byte);
+/* Attach a serial port of the card (gtag of its transmitter, UART or PktUART) to the world outside as bytes: sent is
+ * called for each byte that goes out, and the receiver hears, instead of its pin, what sim_card_serial_put() gives it:
+ * a peer that sends at the port's own rate. HM2_ERR_NOTFOUND when there is no such port. */
+HM2_API int HM2_MUST_CHECK sim_card_serial(struct sim_card *card, uint8_t gtag, unsigned unit, sim_serial_fn sent,
+                                           void *context);
+/* Bytes for the receiver from now on, as many as there is room for (4096): returns how many. */
+HM2_API size_t sim_card_serial_put(struct sim_card *card, uint8_t gtag, unsigned unit, const uint8_t *bytes,
+                                   size_t len);
+
 /* ---- packets ---------------------------------------------------------------------------------------------------- */
 
 /* Card time that belongs to a time of the outside world; the first packet sets it when nobody did. */
