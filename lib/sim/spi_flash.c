@@ -129,7 +129,7 @@ static void erase(struct sim_spi_flash *const flash)
         half_erase(flash, sector);
         return;
     }
-    uint8_t kept[SIM_FLASH_BAD_BITS];
+    uint8_t kept[SIM_FLASH_BAD_BITS] = {0};
     for (unsigned i = 0; i < flash->faults.bad_count; i++)
         kept[i] = flash->bytes[flash->faults.bad[i].address & (flash->size - 1)];
     memset(sector, ERASED, SIM_FLASH_SECTOR_BYTES);

@@ -303,14 +303,14 @@ static void a_xilinx_card_needs_its_boot_block(void **state)
     static const struct {
         unsigned at;
         enum sim_boot boot;
-    } rows[] = {{10, SIM_BOOT_NOTHING},  /* sync word */
-                {25, SIM_BOOT_FALLBACK}, /* bank of the user image */
-                {33, SIM_BOOT_USER},     /* bank of the fallback, which is not needed */
-                {48, SIM_BOOT_NOTHING}}; /* the command to load again */
+    } rows[] = {{10, SIM_BOOT_NOTHING},   /* sync word */
+                {25, SIM_BOOT_FALLBACK},  /* bank of the user image */
+                {33, SIM_BOOT_USER},      /* bank of the fallback, which is not needed */
+                {49, SIM_BOOT_FALLBACK}}; /* the command to load again */
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        flash[rows[i].at] ^= 0x20;
+        flash[rows[i].at] ^= 0x01;
         assert_int_equal(sim_card_would_boot(card), rows[i].boot);
-        flash[rows[i].at] ^= 0x20;
+        flash[rows[i].at] ^= 0x01;
     }
     memset(flash, 0xFF, SECTOR);
     assert_int_equal(sim_card_would_boot(card), SIM_BOOT_NOTHING);
