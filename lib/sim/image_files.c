@@ -155,8 +155,8 @@ static void put_xilinx(struct writer *const w, const struct sim_flash_file *cons
 
 /* ---- Efinix ------------------------------------------------------------------------------------------------------ */
 
-/* mesaflash 3.4.6 misreads headers whose project line is shorter than 80 characters. */
-#define PROJECT "/home/builder/projects/trion/hostmot2/firmware/releases/efinity/2021.2/project/"
+/* mesaflash misreads headers whose project line is longer than 78 characters. */
+#define PROJECT "/home/builder/efinity/2021.2/project/"
 
 static void put_efinix_header(struct writer *const w, const struct sim_flash_file *const file,
                               const struct sim_profile *const profile)

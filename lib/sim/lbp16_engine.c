@@ -620,6 +620,8 @@ int sim_card_flash_memory(struct sim_card *const card, uint8_t *const bytes, con
         return HM2_ERR_RANGE;
     sim_spi_flash_release(flash);
     flash->bytes = bytes;
+    sim_lbp16_power_up(card->lbp16);
+    card->lbp16->ready_ns = INT64_MIN;
     return 0;
 }
 

@@ -31,8 +31,8 @@ HM2_API void sim_card_flash_times(struct sim_card *card, const struct sim_flash_
 
 /* ---- memory, power, boot ---------------------------------------------------------------------------------------- */
 
-/* Let the chip keep its bytes in the caller's memory, of exactly its size, which must outlive the card. What is there
- * counts. HM2_ERR_RANGE for another size. */
+/* Let the chip keep its bytes in the caller's memory, of exactly its size, which must outlive the card. The card has
+ * started from what is there, if it does. HM2_ERR_RANGE for another size. */
 HM2_API int HM2_MUST_CHECK sim_card_flash_memory(struct sim_card *card, uint8_t *bytes, size_t size);
 
 enum sim_boot {
