@@ -157,6 +157,10 @@ $(BUILDDIR)/%: TOOL_LIBS = $(SIM_A) $(LIB_A)
 # The host exports its HAL and RTAPI calls to the modules it loads, so every object of it must be linked in.
 $(BUILDDIR)/hm2host: TOOL_LIBS = -Wl,--whole-archive $(HOST_A) -Wl,--no-whole-archive $(LIB_A) -rdynamic -ldl $(EDIT_LIBS)
 
+# Hashes of image files and dumps.
+MD_LIBS ?= -lmd
+$(BUILDDIR)/hm2flash: TOOL_LIBS = $(LIB_A) $(MD_LIBS)
+
 # A module of LinuxCNC's kind: exactly the names marked with EXPORT_SYMBOL() are global, everything else is local.
 define component_link
 	@mkdir -p $(@D)

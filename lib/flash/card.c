@@ -60,9 +60,9 @@ static void judge_chip(struct flash_card_info *const info)
 {
     const struct lbp16_info *const space = &info->space[LBP16_SPACE_FLASH];
     const struct flash_chip *const chip = flash_chip_of_id((uint8_t)info->flash_id);
-    const bool agrees =
-        chip && (is_power(space->size_log2, chip->bytes) || is_power(space->size_log2, 8 * chip->bytes)) &&
-        is_power(space->erase_log2, chip->sector_bytes) && is_power(space->page_log2, chip->page_bytes);
+    const bool agrees = chip &&
+                        (is_power(space->size_log2, chip->bytes) || is_power(space->size_log2, 8 * chip->bytes)) &&
+                        is_power(space->erase_log2, chip->sector_bytes) && is_power(space->page_log2, chip->page_bytes);
     info->chip = chip && (space->cookie == 0 || agrees) ? chip : NULL;
 }
 
@@ -202,6 +202,23 @@ struct link *flash_card_link(const struct flash_card *const card)
 struct flash_counters flash_card_counters(const struct flash_card *const card)
 {
     return card->port.counters;
+}
+
+/* ---- is there anybody? ------------------------------------------------------------------------------------------ */
+
+int flash_probe(struct link *const link)
+{
+    uint8_t request[16];
+    struct lbp16_builder builder;
+    lbp16_builder_init(&builder, request, sizeof request);
+    const int err = lbp16_add_read_hm2(&builder, HM2_ADDR_COOKIE, 1, NULL);
+    return err < 0 ? err : link_send(link, request, builder.used);
+}
+
+bool flash_probe_answered(struct link *const link, const int64_t deadline_ns)
+{
+    uint8_t reply[LBP16_MAX_REPLY_BYTES];
+    return link_recv(link, reply, sizeof reply, deadline_ns) == 4 && hm2_get_le32(reply) == HM2_COOKIE;
 }
 
 /* ---- what is there now ------------------------------------------------------------------------------------------ */

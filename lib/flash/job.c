@@ -42,9 +42,10 @@ void job_enter(struct flash_job *const job, const enum job_state state)
     if (state == JOB_PLANNED || state == JOB_RECHECK)
         job->pass = 0;
     job->cursor = 0;
-    job->progress.done = 0;
+    job->progress.done = job->progress.total = 0;
     if (job->pass >= job->pass_count)
         return;
+    job->progress.address = job->passes[job->pass].range.start;
     job->sector = job_first_sector(&job->passes[job->pass]);
     if (state == JOB_ERASE)
         job->progress.total = sectors_to_erase(job);
@@ -349,7 +350,7 @@ static int check_alone(struct flash_job *const job, struct hm2_diag *const diag)
     job->foreign_mark = counters->foreign;
     if (foreign <= BUSY_FEW + sent / 4)
         return 0;
-    return hm2_diag_add(diag, HM2_ERR_STATE,
+    return hm2_diag_add(diag, HM2_ERR_IO,
                         "another program has begun to talk to this card (%llu datagrams beside our %llu). The image is "
                         "not complete: do not switch the card off, stop the other program and run the command again",
                         (unsigned long long)foreign, (unsigned long long)sent);
@@ -386,6 +387,15 @@ int flash_job_step(struct flash_job *const job, struct hm2_diag *const diag)
     return job->state != JOB_END;
 }
 
+static int stopped(const struct flash_job *const job, struct hm2_diag *const diag)
+{
+    if (job->kind != JOB_WRITE || job->state == JOB_COMPARE || job->state == JOB_PLANNED)
+        return hm2_diag_add(diag, HM2_ERR_STATE, "stopped; nothing was changed");
+    return hm2_diag_add(diag, HM2_ERR_IO,
+                        "stopped. The image is not complete: do not switch the card off, what it runs now stays until "
+                        "then; run the command again, it goes on where this one ended");
+}
+
 int flash_job_run(struct flash_job *const job, const flash_progress_fn progress, void *const context,
                   struct hm2_diag *const diag)
 {
@@ -394,11 +404,8 @@ int flash_job_run(struct flash_job *const job, const flash_progress_fn progress,
     while ((more = flash_job_step(job, diag)) > 0) {
         const struct flash_progress now = flash_job_progress(job);
         stop = stop || (progress && !progress(context, &now));
-        if (stop && flash_job_between_sectors(job))
-            return hm2_diag_add(diag, HM2_ERR_STATE, "stopped. %s",
-                                job->state == JOB_COMPARE || job->state == JOB_READ || job->state == JOB_PLANNED
-                                    ? "Nothing was changed"
-                                    : "The image is not complete: do not switch the card off, run the command again");
+        if (stop && flash_job_between_sectors(job) && more > 0)
+            return stopped(job, diag);
     }
     return more;
 }

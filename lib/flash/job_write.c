@@ -45,10 +45,21 @@ static int erase_sector(struct flash_job *const job, const unsigned sector, stru
     return job->card->port.counters.resent != resent ? await_copies(job, diag) : 0;
 }
 
+/* Everything was read back when it was written. That is enough unless datagrams were repeated or lost: then one could
+ * have come late, behind what was read. */
+static bool trustworthy(const struct flash_job *const job)
+{
+    const struct flash_port *const port = &job->card->port;
+    return port->counters.resent == job->resent_before && port->behind == 0;
+}
+
 static void next_pass(struct flash_job *const job)
 {
     job->pass++;
-    job_enter(job, job->pass < job->pass_count ? JOB_ERASE : JOB_RECHECK);
+    if (job->pass < job->pass_count)
+        job_enter(job, JOB_ERASE);
+    else
+        job_enter(job, job->options.no_verify || trustworthy(job) ? JOB_GUARD : JOB_RECHECK);
 }
 
 int job_erase(struct flash_job *const job, struct hm2_diag *const diag)
@@ -201,14 +212,6 @@ int job_program(struct flash_job *const job, struct hm2_diag *const diag)
 
 /* ---- afterwards ------------------------------------------------------------------------------------------------- */
 
-/* Everything was read back when it was written. That is enough unless datagrams were repeated or lost: then one could
- * have come late, behind what was read. */
-static bool trustworthy(const struct flash_job *const job)
-{
-    const struct flash_port *const port = &job->card->port;
-    return port->counters.resent == job->resent_before && port->behind == 0;
-}
-
 static bool find_written(struct flash_job *const job)
 {
     for (; job->pass < job->pass_count; job->pass++, job->cursor = 0) {
@@ -222,7 +225,7 @@ static bool find_written(struct flash_job *const job)
 
 int job_recheck(struct flash_job *const job, struct hm2_diag *const diag)
 {
-    if (job->options.no_verify || trustworthy(job) || !find_written(job)) {
+    if (!find_written(job)) {
         job_enter(job, JOB_GUARD);
         return 0;
     }

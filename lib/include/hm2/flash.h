@@ -163,6 +163,11 @@ HM2_API void flash_card_free(struct flash_card *card);
 HM2_API const struct flash_card_info *flash_card_info(const struct flash_card *card);
 HM2_API struct link *flash_card_link(const struct flash_card *card);
 
+/* Is there a card at all? Send one small request; later take the answer, waiting until deadline_ns at most. For asking
+ * many addresses at once. */
+HM2_API int HM2_MUST_CHECK flash_probe(struct link *link);
+HM2_API bool flash_probe_answered(struct link *link, int64_t deadline_ns);
+
 /* Datagrams and what became of them. */
 struct flash_counters {
     uint64_t sent, replies, resent, stale;
@@ -253,7 +258,7 @@ HM2_API void flash_job_free(struct flash_job *job);
  * Between two steps a caller may stop: see flash_job_between_sectors(). */
 HM2_API int HM2_MUST_CHECK flash_job_step(struct flash_job *job, struct hm2_diag *diag);
 /* All steps; progress (may be NULL) is called after each and returns false to stop, which happens when no sector is
- * half written: HM2_ERR_STATE. */
+ * half written: HM2_ERR_STATE when nothing was changed yet, else HM2_ERR_IO. */
 typedef bool (*flash_progress_fn)(void *context, const struct flash_progress *progress);
 HM2_API int HM2_MUST_CHECK flash_job_run(struct flash_job *job, flash_progress_fn progress, void *context,
                                          struct hm2_diag *diag);
