@@ -104,7 +104,7 @@ static struct flash_job *new_job(struct flash_card *const card, const enum job_k
     if (job->most_pages == 0 || job->most_pages > FLASH_PAGES_MOST)
         job->most_pages = FLASH_PAGES_MOST;
     card->port.counters.pages_per_write = 1;
-    job->resent_before = card->port.counters.resent;
+    job->resent_before = job->resent_mark = card->port.counters.resent;
     job->sent_mark = card->port.counters.sent;
     job->foreign_mark = card->port.counters.foreign;
     card->port.behind = 0;

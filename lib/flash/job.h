@@ -37,17 +37,16 @@ struct flash_job {
     uint32_t cursor; /* of the pass: next byte to compare or to read */
     unsigned sector; /* being written, counted in the chip */
     bool in_sector;  /* some of its pages are written and some are not */
-    bool fallback_touched, boot_touched;
 
-    uint8_t attempts[FLASH_MAX_SECTORS];
-    uint8_t todo[MAX_PAGES / 8]; /* pages of the chip that must be written */
-    bool key_blank[MAX_PASSES];  /* the first page is, so the image is not valid as it is */
-    bool proven;                 /* a datagram with several pages did what it should */
+    uint8_t cost[FLASH_MAX_SECTORS]; /* of the attempts that failed */
+    uint8_t todo[MAX_PAGES / 8];     /* pages of the chip that must be written */
+    bool key_blank[MAX_PASSES];      /* the first page is, so the image is not valid as it is */
+    bool proven;                     /* a datagram with several pages did what it should */
     unsigned most_pages;
 
     uint8_t guard[2][FLASH_HEAD_BYTES]; /* of sector 0 and of the fallback area, before */
     bool guarded[2];
-    uint64_t resent_before;
+    uint64_t resent_before, resent_mark; /* repeated datagrams at the start, and at the last failed attempt */
     uint64_t foreign_mark, sent_mark;
 
     struct flash_progress progress;

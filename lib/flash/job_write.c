@@ -4,18 +4,21 @@
 
 #include "job.h"
 
-#define MAX_ATTEMPTS 3u
+/* A sector that does not hold what was written costs so much, and may cost that much altogether: three attempts when
+ * the network did its part, fifteen when datagrams were repeated, of which one may have come damaged. */
+#define COST_CLEAN   5u
+#define COST_REPEAT  1u
+#define COST_MOST    15u
 #define LATE_NS      INT64_C(1200000000) /* a datagram that the network holds back longer is taken for lost */
 #define LATE_STEP_NS INT64_C(50000000)
 
 static int worn(const struct flash_job *const job, struct hm2_diag *const diag)
 {
-    return hm2_diag_add(
-        diag, HM2_ERR_IO,
-        "the flash does not keep what is written: 0x%06X expected 0x%02X but read 0x%02X, after %u "
-        "attempts. Do not switch the card off: what it runs now stays until then. Run the command again; "
-        "if it fails again at this address, the chip is worn",
-        (unsigned)job->difference.address, job->difference.expected, job->difference.read, MAX_ATTEMPTS);
+    return hm2_diag_add(diag, HM2_ERR_IO,
+                        "the flash does not keep what is written: 0x%06X expected 0x%02X but read 0x%02X, again and "
+                        "again. Do not switch the card off: what it runs now stays until then. Run the command again; "
+                        "if it fails again at this address, the chip is worn",
+                        (unsigned)job->difference.address, job->difference.expected, job->difference.read);
 }
 
 /* A repeated erase may still be on its way and must not come after the writing that follows: wait until the card's own
@@ -158,17 +161,27 @@ static void shrink(struct flash_job *const job)
     job->card->port.counters.pages_per_write = 1;
 }
 
-/* Try again, one page at a time: the page alone when only zeros are missing, else the whole sector. */
+/* One more attempt at a sector; an error when there were enough. */
+static int attempt(struct flash_job *const job, struct hm2_diag *const diag)
+{
+    const uint64_t resent = job->card->port.counters.resent;
+    uint8_t *const cost = &job->cost[job->sector];
+    *cost = (uint8_t)(*cost + (resent == job->resent_mark ? COST_CLEAN : COST_REPEAT));
+    job->resent_mark = resent;
+    if (!job->proven)
+        shrink(job);
+    return *cost > COST_MOST ? worn(job, diag) : 0;
+}
+
+/* Try again: the pages alone when only zeros are missing, else the whole sector. */
 static int mend(struct flash_job *const job, const struct job_pass *const pass, const bool erase,
                 struct hm2_diag *const diag)
 {
-    shrink(job);
-    if (++job->attempts[job->sector] > MAX_ATTEMPTS)
-        return worn(job, diag);
-    if (!erase)
-        return 0;
+    int err = attempt(job, diag);
+    if (err < 0 || !erase)
+        return err;
     job_plan_erase(job, pass, job->sector);
-    const int err = erase_sector(job, job->sector, diag);
+    err = erase_sector(job, job->sector, diag);
     job->plan.state[job->sector] = FLASH_SECTOR_WRITE;
     return err;
 }
@@ -244,9 +257,9 @@ int job_recheck(struct flash_job *const job, struct hm2_diag *const diag)
             continue;
         job->difference = (struct flash_difference){true, at + i, want, job->chunk[i]};
         job->sector = (at + i) / FLASH_SECTOR_BYTES;
-        shrink(job);
-        if (++job->attempts[job->sector] > MAX_ATTEMPTS)
-            return worn(job, diag);
+        const int enough = attempt(job, diag);
+        if (enough < 0)
+            return enough;
         job_plan_erase(job, pass, job->sector);
         job_plan_erase(job, pass, job_first_sector(pass));
         job_enter(job, JOB_ERASE);
