@@ -62,6 +62,7 @@ struct sim_card {
 /* card.c */
 void sim_sync(struct sim_module *m); /* advance to the card's present clk */
 struct sim_module *sim_module_of(struct sim_card *card, uint8_t gtag);
+void sim_card_reload(struct sim_card *card); /* as the ICAP asked */
 
 /* pins.c */
 void sim_pins_connect(struct sim_card *card); /* once, when all modules are there */
