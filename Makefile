@@ -44,7 +44,7 @@ endif
 
 # ---- sources: a new file in its folder is part of the build -----------------------------------------------------
 
-LIB_DIRS := core link lbp16 hostmot2 module sslbp board motion ppmc
+LIB_DIRS := core link lbp16 hostmot2 module sslbp board motion ppmc flash
 LIB_SRC := $(sort $(foreach d,$(LIB_DIRS),$(wildcard lib/$(d)/*.c)))
 SIM_SRC := $(sort $(wildcard lib/sim/*.c))
 HOST_SRC := $(sort $(wildcard lib/halhost/*.c))
@@ -161,6 +161,10 @@ $(foreach t,$(TOOLS),$(eval $(call tool_rule,$(t))))
 $(BUILDDIR)/%: TOOL_LIBS = $(SIM_A) $(LIB_A)
 # The host exports its HAL and RTAPI calls to the modules it loads, so every object of it must be linked in.
 $(BUILDDIR)/hm2host: TOOL_LIBS = -Wl,--whole-archive $(HOST_A) -Wl,--no-whole-archive $(LIB_A) -rdynamic -ldl $(EDIT_LIBS)
+
+# Hashes of image files and dumps.
+MD_LIBS ?= -lmd
+$(BUILDDIR)/hm2flash: TOOL_LIBS = $(LIB_A) $(MD_LIBS)
 
 # A module of LinuxCNC's kind: exactly the names marked with EXPORT_SYMBOL() are global, everything else is local.
 define component_link

@@ -338,3 +338,15 @@ void sim_card_power_cycle(struct sim_card *const card)
     power_up(card);
     sim_lbp16_power_up(card->lbp16);
 }
+
+void sim_card_reload(struct sim_card *const card)
+{
+    power_up(card);
+    sim_lbp16_reload(card->lbp16);
+}
+
+void sim_card_power_off(struct sim_card *const card)
+{
+    power_up(card); /* no register keeps anything, no pin drives */
+    sim_lbp16_power_off(card->lbp16);
+}

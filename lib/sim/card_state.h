@@ -61,6 +61,7 @@ struct sim_card {
 
 /* card.c */
 void sim_sync(struct sim_module *m); /* advance to the card's present clk */
+void sim_card_reload(struct sim_card *card); /* as the ICAP asked */
 
 /* pins.c */
 void sim_pins_connect(struct sim_card *card); /* once, when all modules are there */

@@ -16,7 +16,13 @@
 #define LBP_START_NS       500000000  /* seed 000, "LBPReset": unresponsive for as much as half a second */
 #define CONFIGURE_START_NS 1000000000 /* FPGA configuration, then the same */
 #define FRAME_LIMIT_BYTES  0x600u     /* longer frames are neither taken nor sent */
-#define RX_TRAILER_BYTES   6u         /* two bytes of padding in front, four of checksum behind */
+#define SMALLEST_CHIP      0x11u      /* flash tool reference 2.2: room for a boot sector and two areas */
+#define LARGEST_CHIP       0x15u
+#define FLASH_BYTES_OF(id) (1u << ((id) + 1u))
+#define JUMPERS_FALLBACK   3u /* Efinix (flash tool reference 2.4) */
+#define EFINIX_USER_IMAGE  1u
+#define FACTORY_BYTES      1024u /* of the fallback image that a card is made with: small, it is made every time */
+#define RX_TRAILER_BYTES   6u    /* two bytes of padding in front, four of checksum behind */
 #define ETHERTYPE_IP       0x0800u
 #define ETHERTYPE_ARP      0x0806u
 #define PROTOCOL_ICMP      0x01u
@@ -143,7 +149,9 @@ static size_t run_packet(struct sim_lbp16 *const e, const unsigned words)
     enum sim_verdict verdict;
     do {
         verdict = one_command(e);
-    } while (verdict == SIM_DONE && e->y < payload + words);
+    } while (verdict == SIM_DONE && !e->stopped && e->y < payload + words);
+    if (e->stopped)
+        return 0;
     e->CONTROL(LBP16_CONTROL_WRITE_ENABLE) = 0;
     switch (verdict) {
     case SIM_DONE:
@@ -181,7 +189,7 @@ static size_t send_frame(struct sim_lbp16 *const e, const size_t bytes)
 /* Make ready for something that arrives at now_ns; false when nobody listens. */
 static bool listening(struct sim_lbp16 *const e, const int64_t now_ns)
 {
-    if (now_ns < e->ready_ns)
+    if (e->stopped || now_ns < e->ready_ns)
         return false;
     if (!e->has_epoch)
         sim_card_set_time(e->card, now_ns);
@@ -238,8 +246,12 @@ static void restart(struct sim_lbp16 *e, int64_t deaf_ns);
 /* What a packet asked for happens after its reply has gone. */
 static void after_packet(struct sim_lbp16 *const e)
 {
-    if (e->reload)
-        sim_card_power_cycle(e->card);
+    if (e->flash.dead)
+        sim_card_power_off(e->card);
+    else if (e->stopped)
+        e->running = SIM_BOOT_NOTHING;
+    else if (e->icap.reload)
+        sim_card_reload(e->card);
     else if (e->CONTROL(LBP16_CONTROL_RESET) != 0)
         restart(e, LBP_START_NS);
 }
@@ -422,8 +434,8 @@ static void restart(struct sim_lbp16 *const e, const int64_t deaf_ns)
     memset(e->timer, 0, sizeof e->timer);
     memset(e->info, 0, sizeof e->info);
     e->info_pointer = 0;
-    e->icap_step = 0;
-    e->reload = false;
+    e->icap = (struct sim_icap){0};
+    e->info[LBP16_INFO_JUMPERS / 2] = (uint16_t)e->jumpers;
     memcpy(e->info, e->eeprom.words + LBP16_EEPROM_NAME / 2, LBP16_INFO_NAME_BYTES);
     e->info[LBP16_INFO_LBP_VERSION / 2] = e->profile->lbp_version;
     e->info[LBP16_INFO_FIRMWARE / 2] = e->profile->firmware_version;
@@ -443,21 +455,54 @@ static int64_t card_ns(const struct sim_lbp16 *const e)
     return e->epoch_ns + gone / hz * NS_PER_S + gone % hz * NS_PER_S / hz;
 }
 
-void sim_lbp16_power_up(struct sim_lbp16 *const e)
+static void catch_up(struct sim_lbp16 *const e)
 {
     if (e->has_epoch && card_ns(e) > e->now_ns)
         e->now_ns = card_ns(e);
+}
+
+static struct sim_boot_flash boot_flash(const struct sim_lbp16 *const e)
+{
+    return (struct sim_boot_flash){
+        .profile = e->profile, .bytes = e->flash.bytes, .size = e->flash.size, .trust = e->trust};
+}
+
+/* The FPGA loads an image and the processor in it begins, or nothing does. */
+static void configure(struct sim_lbp16 *const e, const uint32_t start, const bool want_user)
+{
+    const struct sim_boot_flash flash = boot_flash(e);
+    e->boot_registers.start = start;
+    e->running = e->profile->efinix ? sim_boot_efinix(&flash, want_user) : sim_boot_xilinx(&flash, &e->boot_registers);
+    e->stopped = e->running != SIM_BOOT_USER && e->running != SIM_BOOT_FALLBACK;
+}
+
+static bool jumpers_want_user(const struct sim_lbp16 *const e)
+{
+    return e->jumpers != JUMPERS_FALLBACK;
+}
+
+void sim_lbp16_power_up(struct sim_lbp16 *const e)
+{
+    catch_up(e);
+    sim_spi_flash_power_up(&e->flash);
+    e->boot_registers = (struct sim_boot_registers){0};
+    configure(e, 0, jumpers_want_user(e));
     restart(e, CONFIGURE_START_NS);
 }
 
-/* First 64 bytes of a Xilinx card's flash: Spartan-6 packets that load the user image and name the fallback
- * (flash tool reference 3.8). */
-static const uint8_t boot_block[64] = {
-    0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xAA, 0x99, 0x55, 0x66, 0x31, 0xE1,
-    0xFF, 0xFF, 0x32, 0x61, 0x00, 0x00, 0x32, 0x81, 0x0B, 0x10, 0x32, 0xA1, 0x00, 0x00, 0x32, 0xC1,
-    0x0B, 0x01, 0x30, 0xA1, 0x00, 0x00, 0x33, 0x01, 0x21, 0x00, 0x32, 0x01, 0x00, 0x1F, 0x30, 0xA1,
-    0x00, 0x0E, 0x20, 0x00, 0x20, 0x00, 0x20, 0x00, 0x20, 0x00, 0x20, 0x00, 0x20, 0x00, 0x20, 0x00,
-};
+void sim_lbp16_reload(struct sim_lbp16 *const e)
+{
+    const struct sim_icap asked = e->icap;
+    catch_up(e);
+    configure(e, asked.start, asked.image == EFINIX_USER_IMAGE);
+    restart(e, CONFIGURE_START_NS);
+}
+
+void sim_lbp16_power_off(struct sim_lbp16 *const e)
+{
+    e->stopped = true;
+    e->running = SIM_BOOT_NOTHING;
+}
 
 static bool all_zero(const uint8_t *const bytes, const size_t count)
 {
@@ -489,11 +534,20 @@ int sim_lbp16_new(struct sim_lbp16 **const engine, struct sim_card *const card,
     e->card = card;
     e->profile = card->profile;
     e->ready_ns = INT64_MIN;
-    if (sim_spi_flash_new(&e->flash, e->profile->flash_id, e->profile->flash_bytes))
+    const uint8_t id = options->flash_id ? options->flash_id : e->profile->flash_id;
+    if (id < SMALLEST_CHIP || id > LARGEST_CHIP)
+        return hm2_diag_add(diag, HM2_ERR_RANGE, "flash ID 0x%02X: the simulated chips are 0x%02X to 0x%02X", id,
+                            SMALLEST_CHIP, LARGEST_CHIP);
+    if (sim_spi_flash_new(&e->flash, id, FLASH_BYTES_OF(id)))
         return hm2_diag_add(diag, HM2_ERR_NOMEM, "no memory for the %u bytes of a simulated flash",
-                            (unsigned)e->profile->flash_bytes);
+                            (unsigned)FLASH_BYTES_OF(id));
+    e->flash.times = *sim_flash_times_of("none");
     if (!e->profile->efinix)
-        memcpy(e->flash.bytes, boot_block, sizeof boot_block);
+        sim_boot_block(e->flash.size, e->flash.bytes);
+    const struct sim_flash_file factory = {
+        .profile = e->profile->name, .area = SIM_AREA_FALLBACK, .bytes = FACTORY_BYTES};
+    (void)sim_card_install(card, &factory);
+    e->running = SIM_BOOT_FALLBACK;
     set_identity(e, options);
     restart(e, 0);
     return 0;
@@ -534,6 +588,86 @@ void sim_card_mac(const struct sim_card *const card, uint8_t mac[6])
 void sim_card_ip(const struct sim_card *const card, uint8_t ip[4])
 {
     memcpy(ip, card->lbp16->ip, 4);
+}
+
+/* ---- flash and power, for hm2/sim_flash.h -------------------------------------------------------------------------
+ */
+
+const struct sim_flash_times *sim_flash_times_of(const char *const name)
+{
+    static const struct sim_flash_times rows[] = {
+        {"none", 0, 0},
+        {"m25p16", 640000, 600000000},
+        {"m25p16-max", 5000000, 3000000000},
+        {"w25q16", 400000, 150000000},
+        {"w25q16-max", 3000000, 2000000000},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        if (strcmp(rows[i].name, name) == 0)
+            return &rows[i];
+    return NULL;
+}
+
+void sim_card_flash_times(struct sim_card *const card, const struct sim_flash_times *const times)
+{
+    card->lbp16->flash.times = *times;
+}
+
+int sim_card_flash_memory(struct sim_card *const card, uint8_t *const bytes, const size_t size)
+{
+    struct sim_spi_flash *const flash = &card->lbp16->flash;
+    if (size != flash->size)
+        return HM2_ERR_RANGE;
+    sim_spi_flash_release(flash);
+    flash->bytes = bytes;
+    sim_lbp16_power_up(card->lbp16);
+    card->lbp16->ready_ns = INT64_MIN;
+    return 0;
+}
+
+void sim_card_flash_faults(struct sim_card *const card, const struct sim_flash_faults *const faults)
+{
+    struct sim_spi_flash *const flash = &card->lbp16->flash;
+    flash->faults = *faults;
+    if (flash->faults.bad_count > SIM_FLASH_BAD_BITS)
+        flash->faults.bad_count = SIM_FLASH_BAD_BITS;
+    flash->counts.operations = 0;
+}
+
+struct sim_flash_counts sim_card_flash_counts(const struct sim_card *const card)
+{
+    return card->lbp16->flash.counts;
+}
+
+enum sim_boot sim_card_would_boot(const struct sim_card *const card)
+{
+    const struct sim_lbp16 *const e = card->lbp16;
+    const struct sim_boot_flash flash = boot_flash(e);
+    struct sim_boot_registers registers = {0};
+    return e->profile->efinix ? sim_boot_efinix(&flash, jumpers_want_user(e)) : sim_boot_xilinx(&flash, &registers);
+}
+
+enum sim_boot sim_card_running(const struct sim_card *const card)
+{
+    return card->lbp16->running;
+}
+
+const char *sim_boot_name(const enum sim_boot boot)
+{
+    static const char *const names[] = {"nothing", "user", "fallback", "other-board"};
+    return names[boot];
+}
+
+void sim_card_jumpers(struct sim_card *const card, const unsigned jumpers)
+{
+    card->lbp16->jumpers = jumpers & JUMPERS_FALLBACK;
+    if (!card->lbp16->stopped)
+        card->lbp16->info[LBP16_INFO_JUMPERS / 2] = (uint16_t)card->lbp16->jumpers;
+}
+
+void sim_card_trust_images(struct sim_card *const card, const bool trust)
+{
+    card->lbp16->trust = trust;
 }
 
 uint8_t *sim_card_flash(struct sim_card *const card, size_t *const size)

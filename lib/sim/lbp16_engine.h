@@ -10,7 +10,9 @@
 #include <hm2/lbp16.h>
 #include <hm2/sim.h>
 
+#include "boot.h"
 #include "eeprom.h"
+#include "icap.h"
 #include "spi_flash.h"
 
 #define SIM_SPACES 8u
@@ -54,15 +56,22 @@ struct sim_lbp16 {
     enum sim_flash_state flash_state;
     uint32_t flash_address, flash_data;
 
-    unsigned icap_step; /* how much of a reload sequence has been seen */
-    bool reload;
+    struct sim_icap icap;
+    unsigned jumpers;
+    bool trust;                               /* images without the simulation's check sum */
+    bool stopped;                             /* in the midst of a packet: the chip never ends, or the power went */
+    enum sim_boot running;                    /* what answers, if anything */
+    struct sim_boot_registers boot_registers; /* Xilinx */
 };
 
 int HM2_MUST_CHECK sim_lbp16_new(struct sim_lbp16 **engine, struct sim_card *card,
                                  const struct sim_card_options *options, struct hm2_diag *diag);
 void sim_lbp16_free(struct sim_lbp16 *engine);
-/* The FPGA was configured: as after power-up, deaf until it has started. */
+/* The power comes back, or (reload) the image that the ICAP asked for is loaded: deaf until it has started, or for good
+ * when nothing does. */
 void sim_lbp16_power_up(struct sim_lbp16 *engine);
+void sim_lbp16_reload(struct sim_lbp16 *engine);
+void sim_lbp16_power_off(struct sim_lbp16 *engine);
 
 /* ---- between the files of the engine ---------------------------------------------------------------------------- */
 

@@ -14,7 +14,12 @@ enum { PROGRAM = 0x02, READ = 0x03, DISABLE = 0x04, STATUS = 0x05, ENABLE = 0x06
 static uint8_t shift(struct sim_lbp16 *const e, const uint8_t byte)
 {
     sim_lbp16_spend(e, BYTE_CLOCKS);
-    return sim_spi_flash_shift(&e->flash, byte);
+    return sim_spi_flash_shift(&e->flash, byte, e->now_ns);
+}
+
+static void deselect(struct sim_lbp16 *const e)
+{
+    sim_spi_flash_deselect(&e->flash, e->now_ns);
 }
 
 static void shift_address(struct sim_lbp16 *const e)
@@ -28,17 +33,22 @@ static void one_byte_command(struct sim_lbp16 *const e, const uint8_t command)
 {
     sim_spi_flash_select(&e->flash);
     (void)shift(e, command);
-    sim_spi_flash_deselect(&e->flash);
+    deselect(e);
 }
 
-/* A page that was being sent is programmed when the chip is deselected; then the firmware asks until it is done. */
+/* A page that was being sent is programmed when the chip is deselected; then the firmware asks until it is done. It
+ * asks for ever when the chip never is. */
 static void finish(struct sim_lbp16 *const e)
 {
-    sim_spi_flash_deselect(&e->flash);
+    deselect(e);
     sim_spi_flash_select(&e->flash);
     (void)shift(e, STATUS);
     (void)shift(e, 0);
-    sim_spi_flash_deselect(&e->flash);
+    if (e->flash.dead || e->flash.busy_until_ns == INT64_MAX)
+        e->stopped = true;
+    else if (e->now_ns < e->flash.busy_until_ns)
+        e->now_ns = e->flash.busy_until_ns;
+    deselect(e);
     one_byte_command(e, DISABLE);
 }
 
@@ -47,13 +57,13 @@ static void commit(struct sim_lbp16 *const e)
     if (e->flash_state == SIM_FLASH_WRITING)
         finish(e);
     else
-        sim_spi_flash_deselect(&e->flash);
+        deselect(e);
     e->flash_state = SIM_FLASH_IDLE;
 }
 
 void sim_lbp16_flash_start(struct sim_lbp16 *const e)
 {
-    sim_spi_flash_deselect(&e->flash);
+    deselect(e);
     e->flash_state = SIM_FLASH_IDLE;
     e->flash_address = e->flash_data = 0;
 }
@@ -64,7 +74,7 @@ uint32_t sim_lbp16_flash_id(struct sim_lbp16 *const e)
     (void)shift(e, SIGNATURE);
     shift_address(e);
     e->flash_data = shift(e, 0);
-    sim_spi_flash_deselect(&e->flash);
+    deselect(e);
     return e->flash_data;
 }
 

@@ -147,26 +147,6 @@ static enum sim_verdict timer_access(struct sim_lbp16 *const e, const unsigned i
 
 /* ---- space 6: status and control -------------------------------------------------------------------------------- */
 
-/* What makes the FPGA load itself again: on Spartan-6 the command register written with IPROG, on Efinix the start
- * bit (flash tool reference 3.13). */
-static void write_icap(struct sim_lbp16 *const e, const uint16_t word)
-{
-    static const uint16_t spartan6[] = {0xAA99, 0x5566, 0x30A1, 0x000E};
-    if (e->profile->efinix) {
-        e->reload = e->reload || (word & 0x000Cu) == 0x000Cu;
-        return;
-    }
-    const bool in_command = e->icap_step == 3;
-    if (word == spartan6[e->icap_step])
-        e->icap_step++;
-    else if (in_command)
-        e->icap_step = 2; /* another command; still in sync */
-    if (e->icap_step == sizeof spartan6 / sizeof spartan6[0]) {
-        e->icap_step = 0;
-        e->reload = true;
-    }
-}
-
 static enum sim_verdict control_access(struct sim_lbp16 *const e, const unsigned index, const bool write,
                                        uint16_t *const value)
 {
@@ -175,7 +155,7 @@ static enum sim_verdict control_access(struct sim_lbp16 *const e, const unsigned
     if (index == LBP16_CONTROL_ICAP / 2) {
         *value = 0;
         if (write)
-            write_icap(e, sim_lbp16_get(e));
+            sim_icap_write(&e->icap, e->profile->efinix, sim_lbp16_get(e));
         return SIM_DONE;
     }
     if (write)
@@ -263,7 +243,7 @@ static uint16_t info_word(struct sim_lbp16 *const e, const unsigned space, const
     case 1:
         return s->sizes;
     case 2:
-        return space == LBP16_SPACE_FLASH ? (uint16_t)(s->ranges | (e->profile->flash_id + 4u)) : s->ranges;
+        return space == LBP16_SPACE_FLASH ? (uint16_t)(s->ranges | (e->flash.id + 4u)) : s->ranges;
     case 3:
         return e->pointer[space];
     default: {

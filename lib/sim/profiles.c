@@ -178,7 +178,7 @@ static const struct sim_profile profiles[] = {
         .eeprom_ip = {10, 10, 10, 10},
         .eeprom_mac_word = 1,
         .flash_id = 0x14,
-        .flash_bytes = 0x200000,
+        .part = "T20F256",
         .firmware = &firmware_7i96s,
     },
     {
@@ -203,7 +203,8 @@ static const struct sim_profile profiles[] = {
         .eeprom_ip = {10, 10, 10, 10},
         .eeprom_mac_word = 1,
         .flash_id = 0x14,
-        .flash_bytes = 0x200000,
+        .part = "6slx9tqg144",
+        .idcode = 0x04001093,
         .firmware = &firmware_7i93,
     },
     {
@@ -215,7 +216,8 @@ static const struct sim_profile profiles[] = {
         .ip = {192, 168, 1, 121},
         .eeprom_ip = {10, 10, 10, 10},
         .flash_id = 0x14,
-        .flash_bytes = 0x200000,
+        .part = "6slx16ftg256",
+        .idcode = 0x04002093,
         .firmware = &firmware_7i80hd,
     },
 };

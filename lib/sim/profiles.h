@@ -39,7 +39,8 @@ struct sim_profile {
     uint8_t eeprom_ip[4];
     unsigned eeprom_mac_word; /* where the MAC address starts: 1 by the manual, 0 on the recorded card */
     uint8_t flash_id;
-    uint32_t flash_bytes;
+    const char *part; /* FPGA, as image files name it, and as it names itself (Xilinx) */
+    uint32_t idcode;
     const struct sim_firmware *firmware;
 };
 

@@ -77,6 +77,38 @@ static void do_power_cycle(const struct command *const c)
         sim_card_power_cycle(c->first[i].card);
 }
 
+static void do_power_off(const struct command *const c)
+{
+    for (unsigned i = 0; i < c->stations; i++)
+        sim_card_power_off(c->first[i].card);
+}
+
+static void do_flash_faults(const struct command *const c)
+{
+    struct hm2_diag diag = {0};
+    struct sim_flash_faults faults;
+    if (flash_faults_option(c->words[1], &faults, &diag)) {
+        snprintf(c->reply, CONTROL_REPLY_SIZE, "error: %.1000s", diag.text);
+        return;
+    }
+    for (unsigned i = 0; i < c->stations; i++)
+        sim_card_flash_faults(c->first[i].card, &faults);
+}
+
+static void do_boots(const struct command *const c)
+{
+    const struct sim_card *const card = c->first[0].card;
+    snprintf(c->reply, CONTROL_REPLY_SIZE, "runs %s boots %s", sim_boot_name(sim_card_running(card)),
+             sim_boot_name(sim_card_would_boot(card)));
+}
+
+static void do_flash(const struct command *const c)
+{
+    const struct sim_flash_counts counts = sim_card_flash_counts(c->first[0].card);
+    snprintf(c->reply, CONTROL_REPLY_SIZE, "programs %" PRIu64 " erases %" PRIu64 " sector-0 %" PRIu64, counts.programs,
+             counts.erases, counts.sector0_erases);
+}
+
 static void do_drive(const struct command *const c)
 {
     unsigned io;
@@ -143,6 +175,10 @@ static const struct {
     {"drive", 3, do_drive},
     {"pad", 2, do_pad},
     {"stats", 1, do_stats},
+    {"power-off", 1, do_power_off},
+    {"flash-faults", 2, do_flash_faults},
+    {"boots", 1, do_boots},
+    {"flash", 1, do_flash},
     {"quit", 1, do_quit},
     {"remote", ANY_WORDS, do_remote},
 };
@@ -184,8 +220,8 @@ bool control_command(char *const text, struct station *const stations, const uns
         commands[i].run(&c);
         return commands[i].run == do_quit;
     }
-    answer(&c, "error: commands are: [card N] faults LIST, freeze on|off, power-cycle, drive IO 0|1|z|h, pad IO, "
-               "remote PORT:CHANNEL ..., stats, quit");
+    answer(&c, "error: commands are: [card N] faults LIST, freeze on|off, power-cycle, power-off, flash, "
+               "flash-faults LIST, boots, drive IO 0|1|z|h, pad IO, remote PORT:CHANNEL ..., stats, quit");
     return false;
 }
 

@@ -448,6 +448,11 @@ enum {
     OPT_REMOTE,
     OPT_SERVO,
     OPT_MAC,
+    OPT_FLASH,
+    OPT_FLASH_CHIP,
+    OPT_FLASH_TIMES,
+    OPT_FLASH_FAULTS,
+    OPT_JUMPERS,
     OPT_LATENCY,
     OPT_REALTIME,
     OPT_RUN,
@@ -474,6 +479,11 @@ static const struct option long_options[] = {
     {"remote", required_argument, NULL, OPT_REMOTE},
     {"servo", required_argument, NULL, OPT_SERVO},
     {"mac", required_argument, NULL, OPT_MAC},
+    {"flash", required_argument, NULL, OPT_FLASH},
+    {"flash-chip", required_argument, NULL, OPT_FLASH_CHIP},
+    {"flash-times", required_argument, NULL, OPT_FLASH_TIMES},
+    {"flash-faults", required_argument, NULL, OPT_FLASH_FAULTS},
+    {"jumpers", required_argument, NULL, OPT_JUMPERS},
     {"latency", no_argument, NULL, OPT_LATENCY},
     {"realtime", optional_argument, NULL, OPT_REALTIME},
     {"run", required_argument, NULL, OPT_RUN},
@@ -511,6 +521,11 @@ static void print_help(void)
           "of the card named last, or of every card when before the first --card:\n"
           "  --firmware FILE     image as text, lines of ADDRESS VALUE in hexadecimal\n"
           "  --mac XX:XX:XX:XX:XX:XX\n"
+          "  --flash FILE        keep the configuration flash in a file\n"
+          "  --flash-chip SIZE   2Mb, 4Mb, 8Mb, 16Mb (the usual one), 32Mb\n"
+          "  --flash-times NAME  none, m25p16, m25p16-max, w25q16, w25q16-max\n"
+          "  --flash-faults LIST cut=OPERATION[:BYTES], stick=OPERATION, bad=ADDRESS:MASK[:TIMES]; by commas\n"
+          "  --jumpers N         address jumpers, 0 to 3; with 3 Efinix cards start the fallback image\n"
           "  --wire FROM:TO      connect two I/O pins\n"
           "  --follow ENC:STEPGEN[:NUM/DEN]  the encoder turns with the step generator\n"
           "  --motor ENC:PWMGEN:COUNTS       the encoder turns with a motor, COUNTS a second at full duty\n"
@@ -559,6 +574,30 @@ static int take_seed(struct reading *const r, const char *const value)
     return 0;
 }
 
+static int take_flash_option(struct reading *const r, const int option, const char *const value)
+{
+    struct flash_options *const flash = &r->card->flash;
+    unsigned long jumpers;
+    switch (option) {
+    case OPT_FLASH_CHIP:
+        return flash_chip_option(value, &flash->id) ? 0
+                                                    : refuse(r, "--flash-chip", value, "2Mb, 4Mb, 8Mb, 16Mb or 32Mb");
+    case OPT_FLASH_TIMES:
+        flash->times = sim_flash_times_of(value);
+        return flash->times ? 0 : refuse(r, "--flash-times", value, "none, m25p16, m25p16-max, w25q16 or w25q16-max");
+    case OPT_FLASH_FAULTS:
+        return flash_faults_option(value, &flash->faults, &r->diag);
+    case OPT_JUMPERS:
+        if (!whole_unsigned(value, 3, &jumpers))
+            return refuse(r, "--jumpers", value, "0 to 3");
+        flash->jumpers = (unsigned)jumpers;
+        return 0;
+    default:
+        flash->file = value;
+        return 0;
+    }
+}
+
 static int take_card_option(struct reading *const r, const int option, const char *const value)
 {
     switch (option) {
@@ -581,8 +620,10 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_remote(r, value);
     case OPT_SERVO:
         return add_servo(r, value);
-    default:
+    case OPT_DRIVE:
         return add_pattern(r, value);
+    default:
+        return take_flash_option(r, option, value);
     }
 }
 

@@ -9,6 +9,8 @@
 
 #include <hm2/sim.h>
 
+#include "flash.h"
+
 #define MAX_CARDS    32u
 #define MAX_WIRES    32u
 #define MAX_PATTERNS 32u
@@ -73,6 +75,7 @@ struct card_options {
     uint16_t port;
     const char *firmware; /* file */
     uint8_t mac[6];
+    struct flash_options flash;
     unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count, remote_count,
         servo_count;
     struct wire wires[MAX_WIRES];

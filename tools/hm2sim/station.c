@@ -125,7 +125,7 @@ static int make_card(struct station *const s, const uint64_t seed, struct hm2_di
 {
     const struct card_options *const o = s->options;
     struct hm2_image image;
-    struct sim_card_options options = {.profile = o->type, .seed = seed};
+    struct sim_card_options options = {.profile = o->type, .seed = seed, .flash_id = o->flash.id};
     memcpy(options.mac, o->mac, sizeof options.mac);
     memcpy(options.ip, &o->address.s_addr, sizeof options.ip);
     if (o->firmware) {
@@ -174,8 +174,10 @@ int station_open(struct station *const s, const struct options *const options, c
     struct sockaddr_in unused;
     struct sim_faults faults = options->faults;
     faults.seed = seed;
-    *s = (struct station){.options = card, .socket = -1, .foreign_socket = -1};
+    *s = (struct station){.options = card, .flash.fd = -1, .socket = -1, .foreign_socket = -1};
     int err = make_card(s, seed, diag);
+    if (!err)
+        err = flash_open(&s->flash, &card->flash, s->card, diag);
     if (!err)
         err = sim_net_new(&s->net, s->card, &faults);
     if (!err)
@@ -203,6 +205,7 @@ void station_close(struct station *const s)
         close(s->foreign_socket);
     sim_net_free(s->net);
     sim_card_free(s->card);
+    flash_close(&s->flash);
 }
 
 /* ---- reports ------------------------------------------------------------------------------------------------------

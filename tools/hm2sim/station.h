@@ -9,6 +9,7 @@ struct station {
     const struct card_options *options;
     struct sim_card *card;
     struct axes axes;
+    struct flash_file flash;
     struct sim_net *net;
     int socket, foreign_socket; /* -1 = not open */
     struct sockaddr_in address;

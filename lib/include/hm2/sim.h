@@ -33,6 +33,7 @@ struct sim_card_options {
     uint8_t ip[4];                 /* address of the card, also in the EEPROM; zeros = those of the profile */
     uint8_t mac[6];                /* zeros = Mesa's prefix and three bytes from the seed */
     enum sim_bus bus;
+    uint8_t flash_id; /* of another flash chip than the profile's, 0x11 to 0x15; see hm2/sim_flash.h */
 };
 
 HM2_API int HM2_MUST_CHECK sim_card_new(struct sim_card **card, const struct sim_card_options *options,
@@ -41,7 +42,8 @@ HM2_API void sim_card_free(struct sim_card *card);
 /* Names of the profiles, NULL-terminated. */
 HM2_API const char *const *sim_profiles(void);
 HM2_API const struct hm2_idrom *sim_card_idrom(const struct sim_card *card);
-/* FPGA reconfigured: every register as after power-up, LBP16 engine reset, EEPROM and flash kept. */
+/* Off and on: every register as after power-up, LBP16 engine reset, EEPROM and flash kept. A card whose flash holds no
+ * image that starts stays deaf (hm2/sim_flash.h); a new one has a fallback image. */
 HM2_API void sim_card_power_cycle(struct sim_card *card);
 
 /* ---- register bus at clock resolution ---------------------------------------------------------------------------

@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* One JSON object on a line of stdout. */
+#include <stdio.h>
+#include <string.h>
+
+#include "cli.h"
+
+#define MAX_DEPTH 8u
+
+static bool started[MAX_DEPTH];
+static unsigned depth;
+
+static void comma(void)
+{
+    if (started[depth])
+        fputs(", ", stdout);
+    started[depth] = true;
+}
+
+static void put_string(const char *text)
+{
+    putchar('"');
+    for (; *text; text++)
+        if (*text == '"' || *text == '\\')
+            printf("\\%c", *text);
+        else if ((unsigned char)*text < ' ' || (unsigned char)*text > '~')
+            printf("\\u%04X", (unsigned char)*text);
+        else
+            putchar(*text);
+    putchar('"');
+}
+
+static void put_key(const char *const key)
+{
+    comma();
+    put_string(key);
+    fputs(": ", stdout);
+}
+
+static void open_bracket(const char bracket)
+{
+    putchar(bracket);
+    if (depth + 1 < MAX_DEPTH)
+        depth++;
+    started[depth] = false;
+}
+
+void json_begin(const struct cli *const cli)
+{
+    if (!cli->json)
+        return;
+    depth = 0;
+    open_bracket('{');
+    json_text(cli, "address", cli->address ? cli->address : "");
+    if (cli->info)
+        json_text(cli, "device", card_name(cli));
+}
+
+void json_text(const struct cli *const cli, const char *const key, const char *const value)
+{
+    if (!cli->json)
+        return;
+    put_key(key);
+    put_string(value);
+}
+
+void json_number(const struct cli *const cli, const char *const key, const double value)
+{
+    if (!cli->json)
+        return;
+    put_key(key);
+    printf("%.12g", value);
+}
+
+void json_bool(const struct cli *const cli, const char *const key, const bool value)
+{
+    if (!cli->json)
+        return;
+    put_key(key);
+    fputs(value ? "true" : "false", stdout);
+}
+
+void json_array(const struct cli *const cli, const char *const key)
+{
+    if (!cli->json)
+        return;
+    put_key(key);
+    open_bracket('[');
+}
+
+void json_object(const struct cli *const cli)
+{
+    if (!cli->json)
+        return;
+    comma();
+    open_bracket('{');
+}
+
+void json_close(const struct cli *const cli, const char bracket)
+{
+    if (!cli->json)
+        return;
+    putchar(bracket);
+    if (depth > 0)
+        depth--;
+}
+
+void json_end(const struct cli *const cli)
+{
+    json_close(cli, '}');
+    if (cli->json)
+        putchar('\n');
+}
+
+void json_result(const struct cli *const cli, const char *const action)
+{
+    json_begin(cli);
+    json_text(cli, "action", action);
+    json_bool(cli, "done", true);
+    json_end(cli);
+}
