@@ -2,7 +2,9 @@
 /* Every module model of the simulated card, one line each. */
 #include "sim_card.h"
 
+extern const struct sim_module_ops sim_biss_ops;
 extern const struct sim_module_ops sim_encoder_ops;
+extern const struct sim_module_ops sim_fabs_ops;
 extern const struct sim_module_ops sim_hm2dpll_ops;
 extern const struct sim_module_ops sim_inm_ops;
 extern const struct sim_module_ops sim_inmux_ops;
@@ -14,6 +16,7 @@ extern const struct sim_module_ops sim_led_ops;
 extern const struct sim_module_ops sim_muxed_encoder_ops;
 extern const struct sim_module_ops sim_muxed_select_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
+extern const struct sim_module_ops sim_ssi_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_watchdog_ops;
 
@@ -32,5 +35,8 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_inmux_ops,         /* 1E */
     &sim_outm_ops,          /* 2D */
     &sim_ssr_ops,           /* C3 */
+    &sim_ssi_ops,           /* 08 */
+    &sim_biss_ops,          /* 18 */
+    &sim_fabs_ops,          /* 19 */
     NULL,
 };
