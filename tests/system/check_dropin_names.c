@@ -25,6 +25,7 @@
 
 struct load {
     const char *card, *name, *config;
+    const char *image, *hal; /* firmware from tests/data/idrom and the card's name in HAL; NULL = the card's own */
 };
 
 static const struct load loads[] = {
@@ -42,6 +43,9 @@ static const struct load loads[] = {
     {"7i93", "no-dpll", "num_dplls=0 enable_raw"},
     {"7i93", "encoders-only", "num_pwmgens=0 num_stepgens=0 num_leds=0"},
     {"7i93", "wide-stepgens", "stepgen_width=6 firmware=ignored.bit"},
+    {"7i80hd-16", "ssi", "ssi_chan_0=a%12ub%3fc%1b%2pd%12s ssi_chan_2=pos%25ge", "SISS4_4_72", "7i80"},
+    {"7i80hd-16", "biss", "biss_chan_0=turns%12hpos%18l", "BI1_72", "7i80"},
+    {"7i80hd-16", "fanuc", "fanuc_chan_0=AA64", "FA1_72", "7i80"},
 };
 #define LOADS (sizeof loads / sizeof loads[0])
 
@@ -94,7 +98,10 @@ static bool load(const struct load *const load, const char *const driver)
     write_file(folder, "load.hal", text);
     snprintf(hal, sizeof hal, "%s/load.hal", folder);
     ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
-    const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer", TEST_BUILD, folder, load->card, hal, NULL};
+    char image[280];
+    snprintf(image, sizeof image, TEST_DATA "/idrom/%s.hex", load->image ? load->image : "");
+    const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer", TEST_BUILD, folder, load->card, hal,
+                                load->image ? "--firmware" : NULL,         image,      NULL};
     const int status = process_run(&run, argv, PEER_LIMIT_MS);
     if (status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
         printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
@@ -226,7 +233,7 @@ START_TEST(every_object_of_linuxcncs_driver_exists_in_ours_with_type_direction_a
 {
     const struct load *const l = &loads[_i];
     snprintf(where, sizeof where, "names/%s/%s", l->card, l->name);
-    snprintf(prefix, sizeof prefix, "hm2_%s.0.", l->card);
+    snprintf(prefix, sizeof prefix, "hm2_%s.0.", l->hal ? l->hal : l->card);
     if (!can_load_ours() || !load(l, "hm2_eth"))
         return;
     read_listing(&theirs);
