@@ -13,6 +13,13 @@
 /* ---- for the kinds -------------------------------------------------------------------------------------------------
  */
 
+const char *hm2_absenc_output_name(const struct hm2_pd *const pd)
+{
+    static const char *const names[] = {"clock", "clock-enable"};
+    const unsigned number = pd->secondary_pin - (HM2_PIN_OUTPUT | 1u);
+    return number < sizeof names / sizeof names[0] ? names[number] : NULL;
+}
+
 int hm2_absenc_add_control(struct hm2_absenc_channel *const channel, const struct hm2_module *const module,
                            struct hm2_setup *const setup, const unsigned control, const unsigned reg)
 {

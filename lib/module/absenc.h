@@ -78,6 +78,8 @@ static inline bool hm2_absenc_has_format(const char formats[HM2_CFG_CHANNELS][HM
     return unit < HM2_CFG_CHANNELS && formats[unit][0];
 }
 
+/* Names of the output pins of SSI and BISS; Fanuc's have none. */
+const char *hm2_absenc_output_name(const struct hm2_pd *pd);
 int HM2_MUST_CHECK hm2_absenc_add_control(struct hm2_absenc_channel *channel, const struct hm2_module *module,
                                           struct hm2_setup *setup, unsigned control, unsigned reg);
 /* Rate register for the bit clock, clock * rate / one; a frequency outside 1..max is rewritten. */

@@ -86,5 +86,6 @@ const struct hm2_module_type hm2_ssi_type = {
     .unpack = hm2_absenc_unpack,
     .pack = hm2_absenc_pack,
     .write_lost = hm2_absenc_write_lost,
+    .output_name = hm2_absenc_output_name,
     .groups = groups,
 };
