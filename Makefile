@@ -101,6 +101,7 @@ help: ## this list
 # ---- libraries ----------------------------------------------------------------------------------------------------
 
 # The flags of a folder hold for its objects (.o) and for the checks of its sources (.lint).
+$(BUILDDIR)/obj/lib/board/%: EXTRA_CPPFLAGS := -Ilib/module
 $(BUILDDIR)/obj/lib/sim/%: EXTRA_CPPFLAGS := -Ilib/sim
 $(BUILDDIR)/obj/lib/halhost/%: EXTRA_CPPFLAGS := -Ilib/halhost -Ilib/halhost/include
 $(BUILDDIR)/obj/components/%: EXTRA_CPPFLAGS := -Icomponents -Ilib/halhost/include -DRTAPI -D__MODULE__

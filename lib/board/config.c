@@ -6,15 +6,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SPACES        " \t\n\r\v\f"
-#define SHOWN         60 /* characters of a token that a sentence quotes */
-#define MAX_TOKEN     256u
-#define MAX_COUNT     1000     /* more than any firmware can hold: instances are a byte, resolvers come in sixes */
-#define MAX_BAUD      10000000 /* of smart serial */
-#define MAX_WIDTH     8        /* stepgen pins (hal-interface 1.2) */
-#define FORMAT_BITS   96u      /* of an absolute encoder's format in all (hal-interface 2.17) */
-#define FIELD_BITS    32u
-#define FANUC_BUILTIN "AA64"
+#include "absenc_format.h"
+
+#define SPACES    " \t\n\r\v\f"
+#define SHOWN     60 /* characters of a token that a sentence quotes */
+#define MAX_TOKEN 256u
+#define MAX_COUNT 1000     /* more than any firmware can hold: instances are a byte, resolvers come in sixes */
+#define MAX_BAUD  10000000 /* of smart serial */
+#define MAX_WIDTH 8        /* stepgen pins (hal-interface 1.2) */
 
 static const char *const count_keys[HM2_CFG_COUNTS] = {
     [HM2_CFG_ENCODERS] = "num_encoders", [HM2_CFG_RESOLVERS] = "num_resolvers", [HM2_CFG_PWMGENS] = "num_pwmgens",
@@ -152,47 +151,17 @@ static void take_serial_numbers(struct scan *const scan, const unsigned unused, 
 /* ---- ssi_chan_N=FORMAT and its kin ---------------------------------------------------------------------------------
  */
 
-/* One field "name%<length><modifiers><type>"; moves past it (hal-interface 2.17). */
-static bool take_field(const char **const text, unsigned *const bits)
-{
-    const char *at = strchr(*text, '%');
-    if (!at)
-        return false;
-    unsigned length = 0;
-    for (at++; *at >= '0' && *at <= '9'; at++) {
-        length = length * 10u + (unsigned)(*at - '0');
-        if (length > FIELD_BITS)
-            return false;
-    }
-    at += strspn(at, "gGmM");
-    if (length == 0 || *at == '\0' || !strchr("bBuUsSfFpPeEhHlL", *at))
-        return false;
-    *bits += length;
-    *text = at + 1;
-    return true;
-}
-
-static bool is_format(const char *text)
-{
-    unsigned bits = 0;
-    do {
-        if (!take_field(&text, &bits))
-            return false;
-    } while (*text);
-    return bits <= FORMAT_BITS;
-}
-
 static void take_format(struct scan *const scan, char *const format, const char *const value, const bool builtin)
 {
     const size_t len = strlen(value);
-    if (len < HM2_CFG_FORMAT_SIZE && (is_format(value) || (builtin && strcmp(value, FANUC_BUILTIN) == 0))) {
+    if (len < HM2_CFG_FORMAT_SIZE && hm2_absenc_format_bits(builtin ? hm2_absenc_expand(value) : value) > 0) {
         memcpy(format, value, len + 1);
         return;
     }
     REFUSE(scan,
            "config: \"%.*s\": fields name%%<length><modifiers><type> are expected after \"=\", with lengths from 1 to "
            "%u and at most %u bits in all%s",
-           SHOWN, scan->token, FIELD_BITS, FORMAT_BITS, builtin ? ", or " FANUC_BUILTIN : "");
+           SHOWN, scan->token, HM2_ABSENC_FIELD_BITS, HM2_ABSENC_BITS, builtin ? ", or " HM2_ABSENC_AA64 : "");
 }
 
 static void take_ssi(struct scan *const scan, const unsigned channel, const char *const value)

@@ -5,8 +5,10 @@
 
 #include <hm2/module.h>
 
+extern const struct hm2_module_type hm2_biss_type;
 extern const struct hm2_module_type hm2_dpll_type;
 extern const struct hm2_module_type hm2_encoder_type;
+extern const struct hm2_module_type hm2_fanuc_type;
 extern const struct hm2_module_type hm2_inm_type;
 extern const struct hm2_module_type hm2_inmux_type;
 extern const struct hm2_module_type hm2_ioport_type;
@@ -17,6 +19,7 @@ extern const struct hm2_module_type hm2_pwmgen_type;
 extern const struct hm2_module_type hm2_raw_type;
 extern const struct hm2_module_type hm2_sserial_type;
 extern const struct hm2_module_type hm2_sserialb_type;
+extern const struct hm2_module_type hm2_ssi_type;
 extern const struct hm2_module_type hm2_ssr_type;
 extern const struct hm2_module_type hm2_stepgen_type;
 extern const struct hm2_module_type hm2_watchdog_type;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "lbp16_engine.h"
+#include "map.h"
 #include "profiles.h"
 
 #define PAGE_SHIFT       8
@@ -146,6 +147,11 @@ const struct hm2_idrom *sim_idrom(const struct sim_card *const card)
     return &card->idrom;
 }
 
+bool sim_sources_are_later(const struct sim_card *const card)
+{
+    return card->later_sources;
+}
+
 const struct hm2_idrom *sim_card_idrom(const struct sim_card *const card)
 {
     return &card->idrom;
@@ -179,6 +185,17 @@ struct sim_module *sim_find(struct sim_card *const card, const uint8_t gtag)
     if (m)
         sim_sync(m);
     return m;
+}
+
+int sim_card_absolute(struct sim_card *const card, const uint8_t gtag, const unsigned unit,
+                      const struct sim_absolute *const encoder)
+{
+    struct sim_module *const m = sim_find(card, gtag);
+    if (!m || !m->ops->absolute)
+        return HM2_ERR_NOTFOUND;
+    if (encoder->bits > 128 || encoder->delay_ps < 0 || encoder->idle_ps < 0 || encoder->bit_ps < 0)
+        return HM2_ERR_RANGE;
+    return m->ops->absolute(m, unit, encoder);
 }
 
 void sim_bite(struct sim_card *const card)
@@ -287,6 +304,8 @@ static int build(struct sim_card *const card, const struct sim_card_options *con
     const enum sim_bus natural = profile->efinix ? SIM_BUS_ZEROS : SIM_BUS_ONES;
     const enum sim_bus bus = options->bus != SIM_BUS_OF_PROFILE ? options->bus : natural;
     card->undriven_value = bus == SIM_BUS_ONES ? UINT32_MAX : 0;
+    card->later_sources = options->sources == SIM_SOURCES_LATER ||
+                          (options->sources == SIM_SOURCES_OF_MAP && sim_map_is_new(&card->idrom));
     for (unsigned i = 0; i < card->idrom.module_count; i++) {
         const int err = add_module(card, &card->idrom.modules[i], diag);
         if (err)

@@ -34,6 +34,7 @@ struct sim_card {
     struct hm2_image image; /* writable: the IDROM is a RAM (register map 1.2) */
     struct hm2_idrom idrom; /* as at configuration */
     uint32_t undriven_value;
+    bool later_sources;
     bool idrom_writable;
     int64_t clk;
 

@@ -4,7 +4,9 @@
 
 extern const struct sim_module_ops sim_bspi_ops;
 extern const struct sim_module_ops sim_dbspi_ops;
+extern const struct sim_module_ops sim_biss_ops;
 extern const struct sim_module_ops sim_encoder_ops;
+extern const struct sim_module_ops sim_fabs_ops;
 extern const struct sim_module_ops sim_hm2dpll_ops;
 extern const struct sim_module_ops sim_inm_ops;
 extern const struct sim_module_ops sim_inmux_ops;
@@ -19,6 +21,7 @@ extern const struct sim_module_ops sim_muxed_select_ops;
 extern const struct sim_module_ops sim_pktuart_rx_ops;
 extern const struct sim_module_ops sim_pktuart_tx_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
+extern const struct sim_module_ops sim_ssi_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_sserial_ops;
 extern const struct sim_module_ops sim_sserialb_ops;
@@ -50,5 +53,8 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_uart_rx_ops,       /* 0A */
     &sim_pktuart_tx_ops,    /* 1B */
     &sim_pktuart_rx_ops,    /* 1C */
+    &sim_ssi_ops,           /* 08 */
+    &sim_biss_ops,          /* 18 */
+    &sim_fabs_ops,          /* 19 */
     NULL,
 };

@@ -132,18 +132,28 @@ int sim_card_drive(struct sim_card *const card, const int64_t clk, const unsigne
     return 0;
 }
 
-int sim_card_drive_input(struct sim_card *const card, const int64_t clk, const uint8_t gtag, const unsigned unit,
-                         const uint8_t secondary_pin, const enum sim_level level)
+int sim_drive_input_at(struct sim_card *const card, const int64_t clk, const unsigned ps, const uint8_t gtag,
+                       const unsigned unit, const uint8_t secondary_pin, const enum sim_level level)
 {
     struct sim_module *const m = sim_module_of(card, gtag);
-    if (!m || !m->ops->input)
+    if (!m || (!m->ops->input && !m->ops->input_at))
         return HM2_ERR_NOTFOUND;
     if (secondary_pin & HM2_PIN_OUTPUT)
         return HM2_ERR_INVALID;
-    sim_card_advance(card, clk + 1);
+    const bool high = level == SIM_HIGH || level == SIM_PULLUP;
+    sim_card_advance(card, m->ops->input_at ? clk : clk + 1);
     sim_sync(m);
-    m->ops->input(m, unit, secondary_pin, level == SIM_HIGH || level == SIM_PULLUP);
+    if (m->ops->input_at)
+        m->ops->input_at(m, unit, secondary_pin, high, clk, ps);
+    else
+        m->ops->input(m, unit, secondary_pin, high);
     return 0;
+}
+
+int sim_card_drive_input(struct sim_card *const card, const int64_t clk, const uint8_t gtag, const unsigned unit,
+                         const uint8_t secondary_pin, const enum sim_level level)
+{
+    return sim_drive_input_at(card, clk, 0, gtag, unit, secondary_pin, level);
 }
 
 /* ---- watched outputs ----------------------------------------------------------------------------------------------

@@ -191,7 +191,7 @@ static const struct sim_profile profiles[] = {
         .eeprom_ip = {10, 10, 10, 10},
         .eeprom_mac_word = 1,
         .flash_id = 0x14,
-        .flash_bytes = 0x200000,
+        .part = "T20F256",
         .firmware = &firmware_7i96s_7i77d,
     },
     {

@@ -237,6 +237,50 @@ static const struct replay_signal pktuart_signals[] = {
     {"tx", REPLAY_OUTPUT, HM2_GTAG_PKTUART_TX, 0x81, 0},
     {"txen", REPLAY_OUTPUT, HM2_GTAG_PKTUART_TX, 0x82, 0},
     {"rx", REPLAY_INPUT, HM2_GTAG_PKTUART_RX, 0x01, 0},
+/* ---- absolute encoders ---------------------------------------------------------------------------------------------
+ */
+
+#define DPLL_REGISTERS                                          \
+    {"dpll_baserate", 0x7000, 0}, {"dpll_control0", 0x7200, 0}, \
+    {                                                           \
+        "dpll_timers12", 0x7400, 0                              \
+    }
+
+static const struct replay_register ssi_registers[] = {
+    {"data0", 0x6800, 4},     {"data1", 0x6900, 4},  {"control", 0x6A00, 4}, {"data0_1", 0x6804, 0},
+    {"control_1", 0x6A04, 0}, {"global", 0x6B00, 0}, DPLL_REGISTERS,         {NULL, 0, 0},
+};
+
+static const struct replay_signal ssi_signals[] = {
+    {"clkout", REPLAY_OUTPUT, HM2_GTAG_SSI, 0x81, 0},
+    {"clkout_1", REPLAY_OUTPUT, HM2_GTAG_SSI, 0x81, 1},
+    {"clken", REPLAY_OUTPUT, HM2_GTAG_SSI, 0x82, 0},
+    {"data", REPLAY_INPUT, HM2_GTAG_SSI, 0x03, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+static const struct replay_register biss_registers[] = {
+    {"data", 0x4900, 4},   {"control0", 0x4A00, 4}, {"control1", 0x4B00, 4},
+    {"global", 0x4C00, 0}, DPLL_REGISTERS,          {NULL, 0, 0},
+};
+
+static const struct replay_signal biss_signals[] = {
+    {"clkout", REPLAY_OUTPUT, HM2_GTAG_BISS, 0x81, 0},
+    {"clken", REPLAY_OUTPUT, HM2_GTAG_BISS, 0x82, 0},
+    {"dav", REPLAY_OUTPUT, HM2_GTAG_BISS, 0x84, 0},
+    {"data", REPLAY_INPUT, HM2_GTAG_BISS, 0x03, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+static const struct replay_register fabs_registers[] = {
+    {"data0", 0x1500, 4},    {"data1", 0x1600, 4},  {"data2", 0x1700, 4}, {"control0", 0x1800, 4},
+    {"control1", 0x1900, 4}, {"global", 0x1A00, 0}, DPLL_REGISTERS,       {NULL, 0, 0},
+};
+
+static const struct replay_signal fabs_signals[] = {
+    {"request", REPLAY_OUTPUT, HM2_GTAG_FABS, 0x81, 0},
+    {"rqen", REPLAY_OUTPUT, HM2_GTAG_FABS, 0x82, 0},
+    {"data", REPLAY_INPUT, HM2_GTAG_FABS, 0x03, 0},
     {NULL, REPLAY_PAD, 0, 0, 0},
 };
 
@@ -374,6 +418,36 @@ const struct replay_kind replay_kinds[] = {
      .on_edge = replay_serial_edge,
      .make_inputs = replay_serial_inputs,
      .loop_gtag = HM2_GTAG_PKTUART_TX},
+    {.folder = "ssi",
+     .firmware = "SISS4_4_72",
+     .timer_firmware = "SVSSSI6_4_4_72",
+     .profile = "7i93",
+     .registers = ssi_registers,
+     .signals = ssi_signals,
+     .prepare = replay_absolute_prepare,
+     .before_event = replay_absolute_event},
+    {.folder = "ssi_new",
+     .firmware = "SISS4_4_72",
+     .profile = "7i93",
+     .sources = SIM_SOURCES_LATER,
+     .registers = ssi_registers,
+     .signals = ssi_signals,
+     .prepare = replay_absolute_prepare,
+     .before_event = replay_absolute_event},
+    {.folder = "biss",
+     .firmware = "BI1_72",
+     .profile = "7i93",
+     .registers = biss_registers,
+     .signals = biss_signals,
+     .prepare = replay_absolute_prepare,
+     .before_event = replay_absolute_event},
+    {.folder = "fabs",
+     .firmware = "FA1_72",
+     .profile = "7i93",
+     .registers = fabs_registers,
+     .signals = fabs_signals,
+     .prepare = replay_absolute_prepare,
+     .before_event = replay_absolute_event},
     {.folder = "idrom", .extra = replay_idrom, .no_events = true},
     {.folder = "lbp16", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_lbp16, .no_events = true},
 };

@@ -50,6 +50,18 @@ static int64_t trace_time(const struct replay_run *const run, const int64_t clk,
     return (int64_t)(ns + 1e-6);
 }
 
+/* The part of a clock behind it; times in nanoseconds are whole. */
+static unsigned trace_part(const struct replay_run *const run, const unsigned ps)
+{
+    const double clk_ps = 1e12 / (double)sim_clock_low_hz(run->card);
+    return run->trace->in_ns ? 0 : (unsigned)(ps * REPLAY_PARTS / clk_ps + 0.5);
+}
+
+static unsigned part_ps(const struct replay_run *const run, const struct replay_event *const event)
+{
+    return (unsigned)(event->part * 1e12 / REPLAY_PARTS / (double)sim_clock_low_hz(run->card));
+}
+
 enum sim_level replay_level(const char c, bool *const valid)
 {
     *valid = true;
@@ -88,6 +100,20 @@ static enum sim_level event_level(const struct replay_event *const event, bool *
     return level;
 }
 
+struct time_text {
+    char text[32];
+};
+
+static struct time_text time_text(const int64_t at, const unsigned part)
+{
+    struct time_text t;
+    if (part)
+        (void)snprintf(t.text, sizeof t.text, "%lld.%02u", (long long)at, part);
+    else
+        (void)snprintf(t.text, sizeof t.text, "%lld", (long long)at);
+    return t;
+}
+
 /* ---- edges --------------------------------------------------------------------------------------------------------
  */
 
@@ -103,7 +129,7 @@ static void settle_first_moment(struct replay_run *const run, struct replay_watc
 }
 
 static void compare_edge(struct replay_run *const run, struct replay_watch *const watch, const int64_t at,
-                         const enum sim_level level)
+                         const unsigned part, const enum sim_level level)
 {
     const struct replay_event *const events = run->trace->events;
     if (watch->next >= watch->edge_count) {
@@ -115,9 +141,10 @@ static void compare_edge(struct replay_run *const run, struct replay_watch *cons
     const struct replay_event *const event = &events[watch->edges[watch->next++]];
     bool valid = false;
     const enum sim_level expected = as_driven(event_level(event, &valid));
-    if (at != event->at || level != expected)
-        replay_differs(run, "%s %lld: %s expected %c at %lld (line %u), got %c", time_name(run), (long long)at,
-                       watch->name, level_char(expected), (long long)event->at, event->line, level_char(level));
+    if (at != event->at || part != event->part || level != expected)
+        replay_differs(run, "%s %s: %s expected %c at %s (line %u), got %c", time_name(run), time_text(at, part).text,
+                       watch->name, level_char(expected), time_text(event->at, event->part).text, event->line,
+                       level_char(level));
 }
 
 static void on_edge(void *const context, const int64_t clk, const unsigned ps, const unsigned number,
@@ -133,9 +160,9 @@ static void on_edge(void *const context, const int64_t clk, const unsigned ps, c
         if (watch->number != (int)number)
             continue;
         const int64_t at = trace_time(run, clk, ps);
-        if (at > run->first_edge) {
+        if (at > run->first_edge || (at == run->first_edge && ps > 0)) {
             settle_first_moment(run, watch);
-            compare_edge(run, watch, at, as_driven(level));
+            compare_edge(run, watch, at, trace_part(run, ps), as_driven(level));
         }
         watch->level = as_driven(level);
     }
@@ -214,7 +241,7 @@ static int find_watches(struct replay_run *const run, struct hm2_diag *const dia
                 continue;
             bool valid = false;
             const enum sim_level level = as_driven(event_level(&events[i], &valid));
-            if (events[i].at == run->first_edge) {
+            if (events[i].at == run->first_edge && events[i].part == 0) {
                 watch->initial = level;
                 watch->has_initial = true;
             } else {
@@ -267,9 +294,9 @@ static int play_input(struct replay_run *const run, const struct replay_event *c
         return hm2_diag_add(diag, HM2_ERR_MALFORMED, "events.csv line %u: %.40s = %.20s is no input of folder kind %s.",
                             event->line, event->name, event->value, run->kind->folder);
     const int64_t clk = replay_clk(run, event->at);
-    const int err = signal->kind == REPLAY_PAD
-                        ? sim_card_drive(run->card, clk, number, level)
-                        : sim_card_drive_input(run->card, clk, signal->gtag, number, signal->secondary_pin, level);
+    const int err = signal->kind == REPLAY_PAD ? sim_card_drive(run->card, clk, number, level)
+                                               : sim_drive_input_at(run->card, clk, part_ps(run, event), signal->gtag,
+                                                                    number, signal->secondary_pin, level);
     return err ? hm2_diag_add(diag, err, "events.csv line %u: the card has no input %.40s.", event->line, event->name)
                : 0;
 }
@@ -455,7 +482,7 @@ static int play_events(struct replay_run *const run, struct hm2_diag *const diag
         if (run->difference[0])
             return 0;
         size_t next = i + 1;
-        while (next < end && events[next].at == events[i].at)
+        while (next < end && events[next].at == events[i].at && events[next].part == events[i].part)
             next++;
         const int err = play_moment(run, i, next, diag);
         if (err)
@@ -468,9 +495,12 @@ static int play_events(struct replay_run *const run, struct hm2_diag *const diag
 static int new_card(struct replay_run *const run, struct hm2_diag *const diag)
 {
     struct hm2_image image;
-    if (!replay_firmware(run->kind->firmware, &image))
-        return hm2_diag_add(diag, HM2_ERR_NOTFOUND, "No firmware image %s.", run->kind->firmware);
-    const struct sim_card_options options = {.profile = run->kind->profile, .image = &image};
+    const bool timer = run->kind->timer_firmware && strncmp(run->test->name, "timer_", 6) == 0;
+    const char *const firmware = timer ? run->kind->timer_firmware : run->kind->firmware;
+    if (!replay_firmware(firmware, &image))
+        return hm2_diag_add(diag, HM2_ERR_NOTFOUND, "No firmware image %s.", firmware);
+    const struct sim_card_options options = {
+        .profile = run->kind->profile, .image = &image, .sources = run->kind->sources};
     return sim_card_new(&run->card, &options, diag);
 }
 

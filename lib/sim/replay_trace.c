@@ -72,6 +72,23 @@ static struct replay_test *find_test(const struct replay_trace *const trace, con
     return NULL;
 }
 
+/* "327" or "327.25". */
+static int parse_time(const char *const text, struct replay_event *const event)
+{
+    char whole[24];
+    int64_t part = 0;
+    const size_t len = strcspn(text, ".");
+    if (len >= sizeof whole)
+        return HM2_ERR_MALFORMED;
+    memcpy(whole, text, len);
+    whole[len] = '\0';
+    int err = replay_decimal(whole, REPLAY_MAX_TIME, &event->at);
+    if (!err && text[len] == '.')
+        err = strlen(text + len + 1) == 2 ? replay_decimal(text + len + 1, REPLAY_PARTS - 1, &part) : HM2_ERR_MALFORMED;
+    event->part = (unsigned char)part;
+    return err;
+}
+
 static int parse_event(const struct replay_csv *const csv, const struct event_columns *const columns,
                        struct replay_event *const event, struct hm2_diag *const diag)
 {
@@ -83,7 +100,7 @@ static int parse_event(const struct replay_csv *const csv, const struct event_co
         return hm2_diag_add(diag, HM2_ERR_MALFORMED, "%s line %u: event kind \"%.20s\" is none of %s.", csv->file,
                             csv->line, kind, event_kinds);
     event->kind = kind[0];
-    if (replay_decimal(csv->field[columns->at], REPLAY_MAX_TIME, &event->at))
+    if (parse_time(csv->field[columns->at], event))
         return hm2_diag_add(diag, HM2_ERR_MALFORMED, "%s line %u: time \"%.20s\" is not a number of 0..%d.", csv->file,
                             csv->line, csv->field[columns->at], REPLAY_MAX_TIME);
     return 0;
@@ -103,7 +120,7 @@ static int place_event(struct replay_trace *const trace, struct replay_test **co
                                 "events.csv line %u: the events of test \"%.60s\" are in two pieces.", event->line,
                                 test);
         (*current)->first = trace->event_count - 1;
-    } else if (event->at < event[-1].at) {
+    } else if (event->at < event[-1].at || (event->at == event[-1].at && event->part < event[-1].part)) {
         return hm2_diag_add(diag, HM2_ERR_MALFORMED, "events.csv line %u: time goes back from %lld to %lld.",
                             event->line, (long long)event[-1].at, (long long)event->at);
     }
@@ -172,6 +189,8 @@ static int by_time(const void *const a, const void *const b)
     const struct replay_event *const x = a, *const y = b;
     if (x->at != y->at)
         return x->at < y->at ? -1 : 1;
+    if (x->part != y->part)
+        return x->part < y->part ? -1 : 1;
     return (x->line > y->line) - (x->line < y->line);
 }
 

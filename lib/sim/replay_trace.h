@@ -9,12 +9,15 @@
 #define REPLAY_MAX_TESTS  10000u
 #define REPLAY_MAX_EVENTS 4000000u
 #define REPLAY_MAX_TIME   100000000 /* clocks or nanoseconds */
+#define REPLAY_PARTS      100       /* hundredths of a clock may follow the point of a time */
 
 struct replay_event {
     int64_t at; /* clock, or nanosecond when the trace has them */
     const char *name, *value;
     unsigned line;
     char kind; /* I W R E N J # */
+    unsigned char part; /* of a clock, in hundredths */
+    char kind;          /* I W R E N # */
 };
 
 struct replay_test {
@@ -77,9 +80,11 @@ struct replay_vector {
 struct replay_run;
 
 struct replay_kind {
-    const char *folder;   /* base name */
-    const char *firmware; /* pin package */
-    const char *profile;  /* card */
+    const char *folder;         /* base name */
+    const char *firmware;       /* pin package */
+    const char *timer_firmware; /* of tests that begin with "timer_"; NULL = the same */
+    const char *profile;        /* card */
+    enum sim_sources sources;
     const struct replay_register *registers;
     const struct replay_signal *signals;
     const struct replay_vector *vectors;
@@ -160,6 +165,10 @@ int replay_pwm_measure(const struct replay_kind *kind, const struct replay_files
                        const struct replay_options *options, struct replay_totals *totals, struct hm2_diag *diag);
 int replay_pin_truth(const struct replay_kind *kind, const struct replay_files *files,
                      const struct replay_options *options, struct replay_totals *totals, struct hm2_diag *diag);
+
+/* Absolute encoders of the benches, for tests whose recording leaves out what they did. */
+int replay_absolute_prepare(struct replay_run *run);
+int replay_absolute_event(struct replay_run *run, const struct replay_event *event);
 
 int replay_muxed_inputs(const struct replay_trace *trace, const struct replay_test *test,
                         struct replay_event_list *out);

@@ -38,6 +38,10 @@ struct sim_module_ops {
     /* Called for every input pin after power_up, too. unit is that of the pin descriptor: HM2_UNIT_GLOBAL = all
      * instances. A floating pad is low. */
     void (*input)(struct sim_module *m, unsigned unit, uint8_t secondary_pin, bool level);
+    /* The same ps after edge clk, for models whose inputs ClockHigh samples; used instead of input when not NULL.
+     * Present clk is still clk: edges of ClockHigh before the change are to come. */
+    void (*input_at)(struct sim_module *m, unsigned unit, uint8_t secondary_pin, bool level, int64_t clk, unsigned ps);
+    int (*absolute)(struct sim_module *m, unsigned unit, const struct sim_absolute *encoder); /* may be NULL */
     /* Earliest edge >= present clk after which a watched output may change (earlier is allowed, later is not);
      * SIM_NEVER when none is coming by itself. NULL = never. */
     int64_t (*next_event)(struct sim_module *m);
@@ -73,6 +77,11 @@ extern const struct sim_module_ops *const sim_models[];
 uint32_t sim_clock_low_hz(const struct sim_card *card);
 uint32_t sim_clock_high_hz(const struct sim_card *card);
 const struct hm2_idrom *sim_idrom(const struct sim_card *card);
+/* Modules follow the later sources (enum sim_sources). */
+bool sim_sources_are_later(const struct sim_card *card);
+/* sim_card_drive_input() ps after edge clk. */
+int HM2_MUST_CHECK sim_drive_input_at(struct sim_card *card, int64_t clk, unsigned ps, uint8_t gtag, unsigned unit,
+                                      uint8_t secondary_pin, enum sim_level level);
 /* First module with this tag, or NULL; advanced to the card's present clk. */
 struct sim_module *sim_find(struct sim_card *card, uint8_t gtag);
 /* The same, as far advanced as it is: for models that advance together. */

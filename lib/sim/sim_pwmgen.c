@@ -3,11 +3,11 @@
 #include <limits.h>
 #include <string.h>
 
+#include "high_clock.h"
 #include "pwm_logic.h"
 #include "sim_card.h"
 
 #define INSTANCES_MAX 64u /* address bits 7..2 select the instance (1.1) */
-#define PS_PER_S      1000000000000
 #define NO_PIN        UINT_MAX
 #define DUTY_ONE      4096 /* pwm_duty() */
 #define PIN_A         0x81u
@@ -28,32 +28,6 @@ struct pwmgens {
     struct pwm_reference reference;
     struct pwm_channel channels[INSTANCES_MAX];
 };
-
-/* ---- the two clocks
- * --------------------------------------------------------------------------------------------------- Edges of both lie
- * in the middle of their periods, counted from power-up (README of folder pwmgen). */
-
-/* Edges of ClockHigh before edge clk of ClockLow; with_same: one at the very same time included. */
-static int64_t high_edges(const struct sim_module *const m, const int64_t clk, const bool with_same)
-{
-    const wide low_hz = sim_clock_low_hz(m->card), high_hz = sim_clock_high_hz(m->card);
-    if (low_hz <= 0 || clk < 0)
-        return 0;
-    const wide twice = ((wide)2 * clk + 1) * high_hz - low_hz;
-    if (twice < 0)
-        return 0;
-    return (int64_t)(with_same ? twice / (2 * low_hz) + 1 : (twice + 2 * low_hz - 1) / (2 * low_hz));
-}
-
-/* Edge of ClockLow before edge j (from 0) of ClockHigh, and the time between. */
-static int64_t low_edge(const struct sim_module *const m, const int64_t j, unsigned *const ps)
-{
-    const wide low_hz = sim_clock_low_hz(m->card), high_hz = sim_clock_high_hz(m->card);
-    const wide twice = ((wide)2 * j + 1) * low_hz - high_hz;
-    const wide k = twice >= 0 ? twice / (2 * high_hz) : -1;
-    *ps = (unsigned)((((wide)2 * j + 1) * low_hz - ((wide)2 * k + 1) * high_hz) * PS_PER_S / (2 * low_hz * high_hz));
-    return (int64_t)k;
-}
 
 /* ---- life
  * --------------------------------------------------------------------------------------------------------------- */
@@ -84,7 +58,7 @@ static void power_up(struct sim_module *const m)
 {
     struct pwmgens *const p = m->state;
     p->enable = 0;
-    p->edges = high_edges(m, m->clk, false);
+    p->edges = sim_high_edges(m->card, m->clk, false);
     p->reference = (struct pwm_reference){0};
     for (unsigned i = 0; i < p->count; i++)
         p->channels[i] = (struct pwm_channel){0};
@@ -118,7 +92,7 @@ static void run_to(struct pwmgens *const p, const int64_t edges)
 
 static void advance(struct sim_module *const m, const int64_t clk)
 {
-    run_to(m->state, high_edges(m, clk, false));
+    run_to(m->state, sim_high_edges(m->card, clk, false));
 }
 
 /* ---- registers
@@ -136,7 +110,7 @@ static void write(struct sim_module *const m, const unsigned page, const unsigne
 {
     struct pwmgens *const p = m->state;
     const unsigned i = low / 4;
-    run_to(p, high_edges(m, m->clk, true));
+    run_to(p, sim_high_edges(m->card, m->clk, true));
     if (page == PAGE_VALUE && i < p->count)
         pwm_value_write(&p->channels[i], value);
     else if (page == PAGE_MODE && i < p->count)
@@ -175,13 +149,13 @@ static void trace(struct sim_module *const m, const unsigned unit, const uint8_t
     const enum pwm_pin which = pin == PIN_A ? PWM_PIN_A : PWM_PIN_B;
     struct pwm_reference reference = p->reference;
     struct pwm_channel channel = p->channels[unit];
-    const int64_t end = high_edges(m, to, false);
+    const int64_t end = sim_high_edges(m->card, to, false);
     for (int64_t edge = p->edges; edge < end;) {
         const bool before = pwm_output(&channel, which);
         edge += pwm_run_to_change(&reference, &channel, which, end - edge);
         const bool after = pwm_output(&channel, which);
         unsigned ps = 0;
-        const int64_t clk = low_edge(m, edge - 1, &ps);
+        const int64_t clk = sim_low_edge(m->card, edge - 1, &ps);
         if (after != before)
             report(context, clk, ps, after ? SIM_HIGH : SIM_LOW);
     }

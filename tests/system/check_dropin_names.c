@@ -25,23 +25,28 @@
 
 struct load {
     const char *card, *name, *config;
+    const char *image; /* firmware of tests/data/firmware; NULL = the card's own */
 };
 
 static const struct load loads[] = {
-    {"7i96s", "default", ""},
-    {"7i96s", "no-sserial", "sserial_port_0=xxxxxxxx"},
-    {"7i96s", "raw", "enable_raw"},
-    {"7i96s", "fewer", "num_encoders=0 num_stepgens=2 num_pwmgens=0 enable_raw"},
-    {"7i96s", "no-io-modules", "num_leds=2 num_ssrs=0 num_inms=0 num_outms=0"},
+    {"7i96s", "default", "", NULL},
+    {"7i96s", "no-sserial", "sserial_port_0=xxxxxxxx", NULL},
+    {"7i96s", "raw", "enable_raw", NULL},
+    {"7i96s", "fewer", "num_encoders=0 num_stepgens=2 num_pwmgens=0 enable_raw", NULL},
+    {"7i96s", "no-io-modules", "num_leds=2 num_ssrs=0 num_inms=0 num_outms=0", NULL},
     {"7i96s", "nothing",
-     "num_encoders=0 num_stepgens=0 num_pwmgens=0 num_leds=0 num_ssrs=0 num_inms=0 num_outms=0 num_dplls=0"},
-    {"7i96s", "one-pin-stepgens", "stepgen_width=1 num_leds=3"},
-    {"7i96s", "too-many-clamped", "num_leds=9 num_dplls=5"},
-    {"7i93", "default", ""},
-    {"7i93", "typical", "num_encoders=3 num_pwmgens=3 num_stepgens=2 sserial_port_0=00000000"},
-    {"7i93", "no-dpll", "num_dplls=0 enable_raw"},
-    {"7i93", "encoders-only", "num_pwmgens=0 num_stepgens=0 num_leds=0"},
-    {"7i93", "wide-stepgens", "stepgen_width=6 firmware=ignored.bit"},
+     "num_encoders=0 num_stepgens=0 num_pwmgens=0 num_leds=0 num_ssrs=0 num_inms=0 num_outms=0 num_dplls=0", NULL},
+    {"7i96s", "one-pin-stepgens", "stepgen_width=1 num_leds=3", NULL},
+    {"7i96s", "too-many-clamped", "num_leds=9 num_dplls=5", NULL},
+    {"7i93", "default", "", NULL},
+    {"7i93", "typical", "num_encoders=3 num_pwmgens=3 num_stepgens=2 sserial_port_0=00000000", NULL},
+    {"7i93", "no-dpll", "num_dplls=0 enable_raw", NULL},
+    {"7i93", "encoders-only", "num_pwmgens=0 num_stepgens=0 num_leds=0", NULL},
+    {"7i93", "wide-stepgens", "stepgen_width=6 firmware=ignored.bit", NULL},
+    {"7i93", "absolute",
+     "ssi_chan_0=a%12ub%3fc%1b%2pd%12s ssi_chan_1=pos%25ge biss_chan_1=turns%12hturns%18l fanuc_chan_0=AA64",
+     "absolute_48"},
+    {"7i93", "no-absolute", "", "absolute_48"},
 };
 #define LOADS (sizeof loads / sizeof loads[0])
 
@@ -94,7 +99,10 @@ static bool load(const struct load *const load, const char *const driver)
     write_file(folder, "load.hal", text);
     snprintf(hal, sizeof hal, "%s/load.hal", folder);
     ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
-    const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer", TEST_BUILD, folder, load->card, hal, NULL};
+    char image[280];
+    snprintf(image, sizeof image, TEST_DATA "/firmware/%s.hex", load->image ? load->image : "");
+    const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer", TEST_BUILD, folder, load->card, hal,
+                                load->image ? "--firmware" : NULL,         image,      NULL};
     const int status = process_run(&run, argv, PEER_LIMIT_MS);
     if (status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
         printf("%.*s\n", (int)strcspn(skip, "\n"), skip);

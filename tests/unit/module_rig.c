@@ -242,12 +242,13 @@ static void do_write(struct module_rig *const rig, const struct lbp16_command *c
     }
 }
 
-static uint32_t read_register(const struct module_rig *const rig, const uint16_t address)
+static uint32_t read_register(struct module_rig *const rig, const uint16_t address)
 {
+    rig->clk += rig->read_clk;
     return rig->card ? sim_card_read(rig->card, rig->clk, address, NULL) : rig->readable[address / 4u];
 }
 
-static void do_read(const struct module_rig *const rig, const struct lbp16_command *const command, uint8_t *const out)
+static void do_read(struct module_rig *const rig, const struct lbp16_command *const command, uint8_t *const out)
 {
     for (unsigned i = 0; i < command->count; i++) {
         const size_t step = command->increment ? i * lbp16_item_bytes(command->size) : 0;

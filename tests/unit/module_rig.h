@@ -75,6 +75,7 @@ struct module_rig {
     struct hm2_cycle cycle;
     struct sim_card *card; /* or NULL; the test's own */
     int64_t clk;
+    int64_t read_clk; /* clocks that each read of a register takes */
     /* the "card" otherwise */
     uint32_t readable[0x4000], written[0x4000]; /* [address / 4] */
     uint16_t timer[LBP16_TIMER_BYTES / 2];      /* space 4: plain memory */

@@ -26,6 +26,10 @@ struct sim_card;
 /* What undriven reads give: Xilinx cards ones, Efinix cards zeros (register map 1.1). */
 enum sim_bus { SIM_BUS_OF_PROFILE, SIM_BUS_ONES, SIM_BUS_ZEROS };
 
+/* Which firmware sources the modules follow where two generations of them differ (traces biss, fabs, ssi_new): the
+ * public ones of 2021 or later ones. By default images with the newer address map follow the later ones. */
+enum sim_sources { SIM_SOURCES_OF_MAP, SIM_SOURCES_2021, SIM_SOURCES_LATER };
+
 struct sim_card_options {
     const char *profile;           /* "7i96s", "7i93", ...: card name, EEPROM, bus and default firmware */
     const struct hm2_image *image; /* other firmware instead of the profile's, or NULL; faulty ones are carried too */
@@ -34,6 +38,7 @@ struct sim_card_options {
     uint8_t mac[6];                /* zeros = Mesa's prefix and three bytes from the seed */
     enum sim_bus bus;
     uint8_t flash_id; /* of another flash chip than the profile's, 0x11 to 0x15; see hm2/sim_flash.h */
+    enum sim_sources sources;
 };
 
 HM2_API int HM2_MUST_CHECK sim_card_new(struct sim_card **card, const struct sim_card_options *options,
@@ -83,6 +88,20 @@ HM2_API void sim_card_on_edge(struct sim_card *card, sim_edge_fn fn, void *conte
 /* Drive a module's input directly, whether or not a pin carries it. */
 HM2_API int HM2_MUST_CHECK sim_card_drive_input(struct sim_card *card, int64_t clk, uint8_t gtag, unsigned unit,
                                                 uint8_t secondary_pin, enum sim_level level);
+
+/* An absolute encoder on a channel of SSI (tag 08), BISS (18) or FanucAbs (19), instead of what pads do to its data
+ * line. It answers the card's clock or request as the encoders of the recorded traces did. */
+struct sim_absolute {
+    unsigned bits;       /* 1..128; 0 takes the encoder away */
+    uint32_t value[4];   /* word 0 = least significant bits */
+    int64_t delay_ps;    /* from the clock edge (SSI, BISS) or the end of the request's first edge to the answer */
+    int64_t idle_ps;     /* SSI, BISS: time without clock after which the line goes back to idle; 0 = 20 us, 2 us */
+    int64_t bit_ps;      /* Fanuc: time of a bit; 0 = 976562 */
+    unsigned processing; /* BISS: clocks between acknowledge and start bit */
+};
+/* HM2_ERR_NOTFOUND without such a module or channel, HM2_ERR_RANGE for impossible numbers. */
+HM2_API int HM2_MUST_CHECK sim_card_absolute(struct sim_card *card, uint8_t gtag, unsigned unit,
+                                             const struct sim_absolute *encoder);
 
 /* An encoder that turns with a step generator, in closed form: count = floor(steps * num / den) since the call,
  * with the time stamp that the last count would have. No edges, no cost per count. */
