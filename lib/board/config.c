@@ -9,9 +9,10 @@
 #define SPACES        " \t\n\r\v\f"
 #define SHOWN         60 /* characters of a token that a sentence quotes */
 #define MAX_TOKEN     256u
-#define MAX_COUNT     1000 /* more than any firmware can hold: instances are a byte, resolvers come in sixes */
-#define MAX_WIDTH     8    /* stepgen pins (hal-interface 1.2) */
-#define FORMAT_BITS   96u  /* of an absolute encoder's format in all (hal-interface 2.17) */
+#define MAX_COUNT     1000     /* more than any firmware can hold: instances are a byte, resolvers come in sixes */
+#define MAX_BAUD      10000000 /* of smart serial */
+#define MAX_WIDTH     8        /* stepgen pins (hal-interface 1.2) */
+#define FORMAT_BITS   96u      /* of an absolute encoder's format in all (hal-interface 2.17) */
 #define FIELD_BITS    32u
 #define FANUC_BUILTIN "AA64"
 
@@ -42,6 +43,7 @@ void hm2_config_default(struct hm2_config *const config)
     for (unsigned i = 0; i < HM2_CFG_COUNTS; i++)
         config->count[i] = HM2_CFG_ALL;
     config->stepgen_width = 2;
+    config->sserial_baudrate = -1;
     for (unsigned i = 0; i < HM2_CFG_SSERIAL_PORTS; i++)
         set_modes(config->sserial_mode[i], "");
 }
@@ -128,7 +130,23 @@ static void take_sserial(struct scan *const scan, const unsigned port, const cha
     }
     config->sserial_given = config->sserial_port_given[port] = true;
     set_modes(config->sserial_mode[port], value);
+    config->sserial_named[port] = (uint8_t)len;
     config->sserial_port_used[port] = strspn(value, "x") != len;
+}
+
+static void take_baudrate(struct scan *const scan, const unsigned unused, const char *const value)
+{
+    (void)unused;
+    long number;
+    if (take_number(scan, value, -1, MAX_BAUD, &number))
+        scan->config->sserial_baudrate = (int)number;
+}
+
+static void take_serial_numbers(struct scan *const scan, const unsigned unused, const char *const value)
+{
+    (void)unused;
+    (void)value;
+    scan->config->use_serial_numbers = true;
 }
 
 /* ---- ssi_chan_N=FORMAT and its kin ---------------------------------------------------------------------------------
@@ -206,6 +224,8 @@ static const struct key keys[] = {
     {"stepgen_width", 0, true, take_width},
     {"enable_raw", 0, false, take_raw},
     {"firmware", 0, true, take_nothing}, /* Ethernet cards boot from flash */
+    {"sserial_baudrate", 0, true, take_baudrate},
+    {"use_serial_numbers", 0, false, take_serial_numbers},
     {"sserial_port_", HM2_CFG_SSERIAL_PORTS, true, take_sserial},
     {"ssi_chan_", HM2_CFG_CHANNELS, true, take_ssi},
     {"biss_chan_", HM2_CFG_CHANNELS, true, take_biss},

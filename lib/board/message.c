@@ -40,6 +40,26 @@ static const struct notice_text notice_texts[HM2_NOTICES] = {
     [HM2_NOTICE_HEADROOM] = {"the command asks for ", ", which maxvel or maxaccel does not allow; the axis lags behind",
                              false},
     [HM2_NOTICE_DUMP_STATE] = {NULL, NULL, false},
+    [HM2_NOTICE_REMOTE_LOST] = {"the remote on channel ",
+                                " does not answer any more and is stopped, its inputs keep their last values; check "
+                                "its power and cable, then set run to 0 and to 1",
+                                true},
+    [HM2_NOTICE_REMOTE_NOT_STARTED] = {"the remote on channel ",
+                                       " did not start; check its power and cable, then set run to 0 and to 1", true},
+    [HM2_NOTICE_REMOTE_OTHER] = {"another remote than at load answers on channel ",
+                                 "; it is not driven. Load the component anew for it", true},
+    [HM2_NOTICE_REMOTE_BACK] = {"the remote on channel ", " is back and is driven again", false},
+    [HM2_NOTICE_REMOTE_FAULT] = {"the remote reports faults, bits ",
+                                 " (1 watchdog, 2 not enabled, 4 over-temperature, 8 over-current, 16 over-voltage, 32 "
+                                 "low voltage, 64 illegal mode, 128 LBP)",
+                                 true},
+    [HM2_NOTICE_PORT_STOPPED] = {"the port is stopped after ",
+                                 " restarts by itself; check the remotes, then set run to 0 and to 1", true},
+    [HM2_NOTICE_PORT_LATE] = {"a transfer of ",
+                              " us was not finished in its cycle and the next was skipped; the thread is too fast for "
+                              "these remotes, or the function .read is not in it",
+                              false},
+    [HM2_NOTICE_PARAMETER_REFUSED] = {"the remote on channel ", " did not take a parameter", true},
 };
 
 static void say_bite(const struct text *const text, const struct board_event *const event)

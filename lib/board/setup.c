@@ -229,6 +229,12 @@ static int setup_poke(struct hm2_setup *const setup, const uint16_t address, con
     return board_poke(setup->access, address, words, values, BOARD_TRIES, BOARD_TRY_NS);
 }
 
+static int64_t setup_now_ns(const struct hm2_setup *const setup)
+{
+    const struct hm2_board *const board = setup->access;
+    return link_now_ns(board->link);
+}
+
 static int setup_one(struct hm2_module *const module, struct hm2_setup *const setup)
 {
     const unsigned before = setup->diag ? setup->diag->problems : 0;
@@ -282,6 +288,7 @@ static int create_objects(struct hm2_board *const board, struct hm2_binder *cons
         .access = board,
         .peek = setup_peek,
         .poke = setup_poke,
+        .now_ns = setup_now_ns,
     };
     for (unsigned i = 0; i < board->idrom.pin_count; i++)
         board->pins[i] = (struct hm2_pin){.pd = board->idrom.pins[i]};

@@ -15,6 +15,8 @@ extern const struct hm2_module_type hm2_muxed_encoder_type;
 extern const struct hm2_module_type hm2_outm_type;
 extern const struct hm2_module_type hm2_pwmgen_type;
 extern const struct hm2_module_type hm2_raw_type;
+extern const struct hm2_module_type hm2_sserial_type;
+extern const struct hm2_module_type hm2_sserialb_type;
 extern const struct hm2_module_type hm2_ssr_type;
 extern const struct hm2_module_type hm2_stepgen_type;
 extern const struct hm2_module_type hm2_watchdog_type;

@@ -15,6 +15,8 @@ extern const struct sim_module_ops sim_muxed_encoder_ops;
 extern const struct sim_module_ops sim_muxed_select_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
+extern const struct sim_module_ops sim_sserial_ops;
+extern const struct sim_module_ops sim_sserialb_ops;
 extern const struct sim_module_ops sim_watchdog_ops;
 
 const struct sim_module_ops *const sim_models[] = {
@@ -32,5 +34,7 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_inmux_ops,         /* 1E */
     &sim_outm_ops,          /* 2D */
     &sim_ssr_ops,           /* C3 */
+    &sim_sserial_ops,       /* C1 */
+    &sim_sserialb_ops,      /* C6 */
     NULL,
 };

@@ -253,6 +253,11 @@ static enum sim_level pad_if(struct sim_card *const card, const unsigned io, con
     return level;
 }
 
+bool sim_pad_carries_alternate(struct sim_card *const card, const unsigned io)
+{
+    return io < card->idrom.pin_count && pad_if(card, io, SIM_LOW) != pad_if(card, io, SIM_HIGH);
+}
+
 void sim_pins_trace(struct sim_card *const card, const int64_t to)
 {
     for (unsigned i = 0; i < card->watch_count; i++) {

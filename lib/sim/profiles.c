@@ -54,6 +54,59 @@ static const struct sim_firmware firmware_7i96s = {
     .local_pin_count = ROWS(local_pins_7i96s),
 };
 
+/* Register map 5.5 A: the shipping 7i96s_7i77d, for a 7I77 on P1. I/O 28 is B, not a second A: the listing has a slip.
+ */
+static const struct sim_module_row modules_7i96s_7i77d[] = {
+    {HM2_GTAG_DPLL, 0x00, LOW, 1, 0x7000, 7, 0x00, 0x00000000},
+    {HM2_GTAG_WATCHDOG, 0x00, LOW, 1, 0x0C00, 3, 0x00, 0x00000000},
+    {HM2_GTAG_IOPORT, 0x00, LOW, 3, 0x1000, 5, 0x00, 0x0000001F},
+    {HM2_GTAG_OUTM, 0x00, LOW, 1, 0xB000, 1, 0x00, 0x00000001},
+    {HM2_GTAG_PWMGEN, 0x00, HIGH, 1, 0x4100, 5, 0x00, 0x00000003},
+    {HM2_GTAG_STEPGEN, 0x02, LOW, 5, 0x2000, 10, 0x00, 0x000001FF},
+    {HM2_GTAG_MUXED_ENCODER, 0x04, LOW, 8, 0x3600, 5, 0x00, 0x00000003},
+    {HM2_GTAG_MUXED_ENCODER_SEL, 0x00, LOW, 1, 0x0000, 0, 0x00, 0x00000000},
+    {HM2_GTAG_SSERIAL, 0x00, LOW, 1, 0x5B00, 6, 0x10, 0x0000003C},
+    {HM2_GTAG_SSR, 0x00, LOW, 1, 0x7D00, 2, 0x00, 0x00000003},
+    {HM2_GTAG_INM, 0x00, LOW, 1, 0x8500, 5, 0x00, 0x0000001F},
+    {HM2_GTAG_LED, 0x00, LOW, 1, 0x0200, 1, 0x00, 0x00000000},
+};
+
+static const struct sim_pin_row pins_7i96s_7i77d[] = {
+    {HM2_GTAG_INM, 0, 0x01},           {HM2_GTAG_INM, 0, 0x02},           {HM2_GTAG_INM, 0, 0x03},
+    {HM2_GTAG_INM, 0, 0x04},           {HM2_GTAG_INM, 0, 0x05},           {HM2_GTAG_INM, 0, 0x06},
+    {HM2_GTAG_INM, 0, 0x07},           {HM2_GTAG_INM, 0, 0x08},           {HM2_GTAG_INM, 0, 0x09},
+    {HM2_GTAG_INM, 0, 0x0A},           {HM2_GTAG_INM, 0, 0x0B},           {HM2_GTAG_SSR, 0, 0x81},
+    {HM2_GTAG_SSR, 0, 0x82},           {HM2_GTAG_SSR, 0, 0x83},           {HM2_GTAG_SSR, 0, 0x84},
+    {HM2_GTAG_OUTM, 0, 0x85},          {HM2_GTAG_OUTM, 0, 0x86},          {HM2_GTAG_STEPGEN, 0, 0x81},
+    {HM2_GTAG_STEPGEN, 0, 0x82},       {HM2_GTAG_STEPGEN, 1, 0x81},       {HM2_GTAG_STEPGEN, 1, 0x82},
+    {HM2_GTAG_STEPGEN, 2, 0x81},       {HM2_GTAG_STEPGEN, 2, 0x82},       {HM2_GTAG_STEPGEN, 3, 0x81},
+    {HM2_GTAG_STEPGEN, 3, 0x82},       {HM2_GTAG_STEPGEN, 4, 0x81},       {HM2_GTAG_STEPGEN, 4, 0x82},
+    {HM2_GTAG_MUXED_ENCODER, 3, 0x01}, {HM2_GTAG_MUXED_ENCODER, 3, 0x02}, {HM2_GTAG_MUXED_ENCODER, 3, 0x03},
+    {HM2_GTAG_SSERIAL, 0, 0x04},       {HM2_GTAG_SSERIAL, 0, 0x84},       {HM2_GTAG_SSERIAL, 0, 0x94},
+    {HM2_GTAG_SSR, 0, 0xA0},           {HM2_GTAG_SSERIAL, 0, 0x93},       {HM2_GTAG_SSERIAL, 0, 0x83},
+    {HM2_GTAG_SSERIAL, 0, 0x03},       {HM2_GTAG_SSERIAL, 0, 0x82},       {HM2_GTAG_SSERIAL, 0, 0x02},
+    {HM2_GTAG_SSERIAL, 0, 0x81},       {HM2_GTAG_SSERIAL, 0, 0x01},       {HM2_GTAG_MUXED_ENCODER_SEL, 0, 0x81},
+    {HM2_GTAG_MUXED_ENCODER, 0, 0x01}, {HM2_GTAG_MUXED_ENCODER, 0, 0x02}, {HM2_GTAG_MUXED_ENCODER, 0, 0x03},
+    {HM2_GTAG_MUXED_ENCODER, 1, 0x01}, {HM2_GTAG_MUXED_ENCODER, 1, 0x02}, {HM2_GTAG_MUXED_ENCODER, 1, 0x03},
+    {HM2_GTAG_MUXED_ENCODER, 2, 0x01}, {HM2_GTAG_MUXED_ENCODER, 2, 0x02}, {HM2_GTAG_MUXED_ENCODER, 2, 0x03},
+};
+
+static const struct sim_firmware firmware_7i96s_7i77d = {
+    .board_name = "MESA7I96",
+    .fpga_size = 20,
+    .fpga_pins = 256,
+    .io_ports = 3,
+    .port_width = 17,
+    .clock_low_hz = 100000000,
+    .clock_high_hz = 200000000,
+    .modules = modules_7i96s_7i77d,
+    .module_count = ROWS(modules_7i96s_7i77d),
+    .pins = pins_7i96s_7i77d,
+    .pin_count = ROWS(pins_7i96s_7i77d),
+    .local_pins = local_pins_7i96s,
+    .local_pin_count = ROWS(local_pins_7i96s),
+};
+
 /* Register map 5.1 and 5.2.1: SVST8_4IM2 with the new address map and the DPLL in front, cut at 48 pins. */
 static const struct sim_module_row modules_7i93[] = {
     {HM2_GTAG_DPLL, 0x00, LOW, 1, 0x7000, 7, 0x00, 0x00000000},
@@ -129,6 +182,19 @@ static const struct sim_profile profiles[] = {
         .firmware = &firmware_7i96s,
     },
     {
+        .name = "7i96s_7i77d",
+        .card_name = "7I96S",
+        .efinix = true,
+        .lbp_version = 3,
+        .firmware_version = 17,
+        .ip = {192, 168, 1, 121},
+        .eeprom_ip = {10, 10, 10, 10},
+        .eeprom_mac_word = 1,
+        .flash_id = 0x14,
+        .flash_bytes = 0x200000,
+        .firmware = &firmware_7i96s_7i77d,
+    },
+    {
         .name = "7i93",
         .card_name = "7I93",
         .lbp_version = 3,
@@ -154,7 +220,7 @@ static const struct sim_profile profiles[] = {
     },
 };
 
-static const char *const names[] = {"7i96s", "7i93", "7i80hd-16", NULL};
+static const char *const names[] = {"7i96s", "7i96s_7i77d", "7i93", "7i80hd-16", NULL};
 
 const char *const *sim_profiles(void)
 {
@@ -163,7 +229,7 @@ const char *const *sim_profiles(void)
 
 const char *sim_profile_list(void)
 {
-    return "7i96s, 7i93, 7i80hd-16";
+    return "7i96s, 7i96s_7i77d, 7i93, 7i80hd-16";
 }
 
 const struct sim_profile *sim_profile_find(const char *const name)

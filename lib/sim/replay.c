@@ -109,7 +109,9 @@ static int play_folder(const struct replay_kind *const kind, const struct replay
     char *tests = NULL, *events = NULL;
     size_t tests_len = 0, events_len = 0;
     struct replay_trace trace;
-    int err = load(files, "tests.csv", &tests, &tests_len, diag);
+    int err = files->load(files->context, "scenarios.csv", &tests, &tests_len, diag);
+    if (err == HM2_ERR_NOTFOUND)
+        err = load(files, "tests.csv", &tests, &tests_len, diag);
     if (!err)
         err = load(files, "events.csv", &events, &events_len, diag);
     if (!err)

@@ -183,6 +183,14 @@ static int inputs_low(struct replay_run *const run)
 /* ---- the kinds -----------------------------------------------------------------------------------------------------
  */
 
+/* ---- sslbp --------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register sslbp_registers[] = {
+    {"command", 0x5A00, 0}, {"data", 0x5B00, 0},   {"cs", 0x5C00, 4}, {"user0_", 0x5D00, 4},
+    {"user1_", 0x5E00, 4},  {"user2_", 0x5F00, 4}, {NULL, 0, 0},
+};
+
 const struct replay_kind replay_kinds[] = {
     {.folder = "stepgen",
      .firmware = "SVST4_4_48",
@@ -230,6 +238,13 @@ const struct replay_kind replay_kinds[] = {
      .profile = "7i93",
      .registers = hm2dpll_registers,
      .vectors = hm2dpll_vectors},
+    {.folder = "sslbp",
+     .firmware = "7I76E_51",
+     .profile = "7i93",
+     .registers = sslbp_registers,
+     .prepare = replay_sslbp_prepare,
+     .before_event = replay_sslbp_event,
+     .make_inputs = replay_sslbp_polls},
     {.folder = "idrom", .extra = replay_idrom, .no_events = true},
     {.folder = "lbp16", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_lbp16, .no_events = true},
 };

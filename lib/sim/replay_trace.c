@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char event_kinds[] = "IWREN#";
+static const char event_kinds[] = "IWRENJ#";
 
 /* Grow an array to hold one more element; NULL when the limit is reached or memory is out. */
 static void *grow(void *array, const size_t count, const size_t limit, const size_t size)
@@ -16,6 +16,13 @@ static void *grow(void *array, const size_t count, const size_t limit, const siz
     return realloc(array, (count ? count * 2 : 1) * size);
 }
 
+/* Some recordings call their tests scenarios. */
+static int test_column(const struct replay_csv *const csv, struct hm2_diag *const diag)
+{
+    const int scenario = replay_csv_column(csv, "scenario");
+    return scenario >= 0 ? scenario : replay_csv_need(csv, "test", diag);
+}
+
 static int parse_tests(struct replay_trace *const trace, char *const text, const size_t len,
                        struct hm2_diag *const diag)
 {
@@ -23,7 +30,7 @@ static int parse_tests(struct replay_trace *const trace, char *const text, const
     int err = replay_csv_open(&csv, "tests.csv", text, len, diag);
     if (err)
         return err;
-    const int name = replay_csv_need(&csv, "test", diag);
+    const int name = test_column(&csv, diag);
     const int description = replay_csv_column(&csv, "description");
     if (name < 0)
         return name;
@@ -47,7 +54,7 @@ static int find_columns(const struct replay_csv *const csv, struct replay_trace 
                         struct event_columns *const columns, struct hm2_diag *const diag)
 {
     trace->in_ns = replay_csv_column(csv, "clk") < 0 && replay_csv_column(csv, "ns") >= 0;
-    columns->test = replay_csv_need(csv, "test", diag);
+    columns->test = test_column(csv, diag);
     columns->at = replay_csv_need(csv, trace->in_ns ? "ns" : "clk", diag);
     columns->kind = replay_csv_need(csv, "ev", diag);
     columns->name = replay_csv_need(csv, "name", diag);

@@ -14,7 +14,7 @@ struct replay_event {
     int64_t at; /* clock, or nanosecond when the trace has them */
     const char *name, *value;
     unsigned line;
-    char kind; /* I W R E N # */
+    char kind; /* I W R E N J # */
 };
 
 struct replay_test {
@@ -157,6 +157,10 @@ int replay_pin_truth(const struct replay_kind *kind, const struct replay_files *
 
 int replay_muxed_inputs(const struct replay_trace *trace, const struct replay_test *test,
                         struct replay_event_list *out);
+
+int replay_sslbp_prepare(struct replay_run *run);
+int replay_sslbp_event(struct replay_run *run, const struct replay_event *event);
+int replay_sslbp_polls(const struct replay_trace *trace, const struct replay_test *test, struct replay_event_list *out);
 
 /* Result of one test to the caller. */
 void replay_report(const struct replay_options *options, struct replay_totals *totals, const char *test,

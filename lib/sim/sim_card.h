@@ -82,6 +82,8 @@ void sim_watch_module(struct sim_module *m);
 void sim_pads_changed(struct sim_card *card);
 /* Level of the secondary output behind a pad (SIM_LOW when it has none, or no model). */
 enum sim_level sim_alternate(struct sim_card *card, unsigned io);
+/* The secondary output behind a pad reaches it: the port registers say so. */
+bool sim_pad_carries_alternate(struct sim_card *card, unsigned io);
 /* Level of a pad: driven by the FPGA, else by the world outside; SIM_FLOAT when nobody drives or pulls it. */
 enum sim_level sim_pad_level(struct sim_card *card, unsigned io);
 /* The same for a pad that the FPGA does not drive, for the IOPort model, which knows that. */

@@ -33,7 +33,7 @@ struct pair {
 };
 
 struct muxed {
-    struct sim_qc_bank bank;
+    struct sim_qc_bank bank; /* first: the followers reach it through sim_module.state */
     struct sim_divider rate;
     unsigned deskew;
     int64_t rate_clk; /* rate and deskew were written at this edge */
@@ -201,6 +201,13 @@ static void advance(struct sim_module *const m, const int64_t clk)
     }
     run(x, from, clk);
     m->clk = clk;
+    sim_qc_bank_follow(m, &x->bank, clk);
+}
+
+static int64_t next_event(struct sim_module *const m)
+{
+    const struct muxed *const x = m->state;
+    return sim_qc_bank_next_sample(m, &x->bank);
 }
 
 static uint32_t read(struct sim_module *const m, const unsigned page, const unsigned low, uint32_t *const undriven)
@@ -274,6 +281,7 @@ const struct sim_module_ops sim_muxed_encoder_ops = {
     .read = read,
     .write = write,
     .input = input,
+    .next_event = next_event,
 };
 
 /* ---- the select output, a module of its own without registers -------------------------------------------------------

@@ -218,14 +218,19 @@ void sim_qc_bank_follow(struct sim_module *const m, struct sim_qc_bank *const ba
             follow(bank, i, bank->follows[i].position(m->card, bank->follows[i].unit), clk);
 }
 
+/* Cards have plain or multiplexed encoders; of one that had both, these are the plain ones. */
 static struct sim_module *encoder_module(struct sim_card *const card, const unsigned encoder)
 {
-    struct sim_module *const m = sim_find(card, HM2_GTAG_ENCODER);
+    const bool plain = hm2_idrom_find(sim_idrom(card), HM2_GTAG_ENCODER);
+    struct sim_module *const m = sim_find(card, plain ? HM2_GTAG_ENCODER : HM2_GTAG_MUXED_ENCODER);
     return m && encoder < m->md.instances ? m : NULL;
 }
 
-static int start_following(struct sim_module *const m, const unsigned encoder, const struct sim_follow *const what)
+int sim_qc_follow(struct sim_card *const card, const unsigned encoder, const struct sim_follow *const what)
 {
+    struct sim_module *const m = encoder_module(card, encoder);
+    if (!m)
+        return HM2_ERR_NOTFOUND;
     struct sim_qc_bank *const bank = m->state;
     bank->follows[encoder] = *what;
     bank->follows[encoder].seen = what->position(m->card, what->unit);
@@ -238,25 +243,23 @@ static int start_following(struct sim_module *const m, const unsigned encoder, c
 int sim_card_follow(struct sim_card *const card, const unsigned encoder, const unsigned stepgen, const int32_t num,
                     const int32_t den)
 {
-    struct sim_module *const m = encoder_module(card, encoder);
     const struct hm2_md *const steps = hm2_idrom_find(sim_idrom(card), HM2_GTAG_STEPGEN);
-    if (!m || !steps || stepgen >= steps->instances)
+    if (!steps || stepgen >= steps->instances)
         return HM2_ERR_NOTFOUND;
     if (den <= 0)
         return HM2_ERR_RANGE;
-    return start_following(m, encoder,
-                           &(struct sim_follow){sim_stepgen_position, .unit = stepgen, .num = num, .den = den});
+    return sim_qc_follow(card, encoder,
+                         &(struct sim_follow){sim_stepgen_position, .unit = stepgen, .num = num, .den = den});
 }
 
 int sim_card_motor(struct sim_card *const card, const unsigned encoder, const unsigned pwmgen,
                    const int32_t counts_per_s)
 {
-    struct sim_module *const m = encoder_module(card, encoder);
     const struct hm2_md *const drives = hm2_idrom_find(sim_idrom(card), HM2_GTAG_PWMGEN);
-    if (!m || !drives || pwmgen >= drives->instances)
+    if (!drives || pwmgen >= drives->instances)
         return HM2_ERR_NOTFOUND;
-    return start_following(m, encoder,
-                           &(struct sim_follow){sim_pwmgen_position, .unit = pwmgen, .num = counts_per_s, .den = 1});
+    return sim_qc_follow(card, encoder,
+                         &(struct sim_follow){sim_pwmgen_position, .unit = pwmgen, .num = counts_per_s, .den = 1});
 }
 
 int sim_card_index(struct sim_card *const card, const unsigned encoder, const uint32_t counts)
@@ -273,7 +276,7 @@ int sim_card_index(struct sim_card *const card, const unsigned encoder, const ui
 
 int sim_card_turned(struct sim_card *const card, const uint8_t gtag, const unsigned unit, int64_t *const position)
 {
-    const struct sim_module *const m = sim_find(card, gtag);
+    const struct sim_module *const m = gtag == HM2_GTAG_ENCODER ? encoder_module(card, unit) : sim_find(card, gtag);
     if (!m || unit >= m->md.instances)
         return HM2_ERR_NOTFOUND;
     if (gtag == HM2_GTAG_STEPGEN) {

@@ -138,6 +138,8 @@ uint32_t sim_qc_bank_read(struct sim_module *m, struct sim_qc_bank *bank, unsign
                           uint32_t *undriven);
 /* What a write at edge clk does to the registers that all counters share; the edge itself has been made. */
 void sim_qc_bank_write(struct sim_qc_bank *bank, int64_t clk, unsigned page, uint32_t value);
+/* An encoder of the card, plain or multiplexed, is to follow something from now on. */
+int sim_qc_follow(struct sim_card *card, unsigned encoder, const struct sim_follow *what);
 /* Followers catch up with what they follow; m->clk is where the module is now. */
 void sim_qc_bank_follow(struct sim_module *m, struct sim_qc_bank *bank, int64_t clk);
 /* Registers of every counter, as a DPLL timer samples them just before edge clk. */

@@ -64,7 +64,7 @@ static const char *trace(const char *const kind, const char *const events)
 START_TEST(every_recorded_folder_passes)
 {
     static const char *const kinds[] = {"stepgen", "encoder", "encoder_muxed", "pwmgen", "watchdog",
-                                        "ioport",  "hm2dpll", "idrom",         "lbp16"};
+                                        "ioport",  "hm2dpll", "idrom",         "lbp16",  "sslbp"};
     char path[256];
     snprintf(path, sizeof path, "%s/%s", TEST_DATA, kinds[_i]);
     ck_assert_msg(run(path, NULL, NULL) == 0, "%s", replay.text);
@@ -118,7 +118,7 @@ int main(void)
     TCase *const tests = tcase_create("hm2replay");
     tcase_set_timeout(tests, 2.0 * END_MS / 1000.0);
     tcase_add_checked_fixture(tests, make_folder, remove_folder);
-    tcase_add_loop_test(tests, every_recorded_folder_passes, 0, 9);
+    tcase_add_loop_test(tests, every_recorded_folder_passes, 0, 10);
     tcase_add_test(tests, a_difference_is_printed_and_makes_the_exit_status);
     tcase_add_test(tests, a_folder_of_no_kind_is_named_with_the_known_ones);
     tcase_add_test(tests, a_broken_table_is_refused_with_its_line);

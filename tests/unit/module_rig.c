@@ -128,6 +128,11 @@ static int rig_poke(struct hm2_setup *const setup, const uint16_t address, const
     return rig->peek_error;
 }
 
+static int64_t rig_now_ns(const struct hm2_setup *const setup)
+{
+    return ((const struct module_rig *)setup->access)->cycle.now_ns;
+}
+
 struct module_rig *rig_new(const struct hm2_image *const image, const char *const config)
 {
     struct module_rig *const rig = calloc(1, sizeof *rig);
@@ -156,6 +161,7 @@ struct module_rig *rig_new(const struct hm2_image *const image, const char *cons
         .access = rig,
         .peek = rig_peek,
         .poke = rig_poke,
+        .now_ns = rig_now_ns,
     };
     rig_set_period(rig, RIG_PERIOD_NS);
     return rig;

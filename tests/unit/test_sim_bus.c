@@ -149,7 +149,7 @@ static void what_nobody_drives_is_told_and_rests_as_the_bus_does(void **state)
         struct sim_card *card = NULL;
         uint32_t undriven = 0;
         assert_int_equal(sim_card_new(&card, &options[i], NULL), 0);
-        assert_int_equal(sim_card_read(card, 0, 0x6000, &undriven), rest[i]);
+        assert_int_equal(sim_card_read(card, 0, 0x9F00, &undriven), rest[i]);
         assert_int_equal(undriven, UINT32_MAX);
         assert_int_equal(sim_card_read(card, 0, 0x0100, &undriven), HM2_COOKIE);
         assert_int_equal(undriven, 0);

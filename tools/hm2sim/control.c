@@ -11,7 +11,10 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#define MAX_WORDS 4u
+#include "remotes.h"
+
+#define MAX_WORDS 6u
+#define ANY_WORDS 0u
 
 struct command {
     const char *words[MAX_WORDS];
@@ -115,6 +118,15 @@ static void do_stats(const struct command *const c)
     }
 }
 
+static void do_remote(const struct command *const c)
+{
+    for (unsigned i = 0; i < c->stations; i++) {
+        struct sim_card *const card = c->first[i].card;
+        sim_card_advance(card, sim_card_clock_at(card, c->now_ns));
+        remotes_command(card, c->words + 1, c->count - 1, c->reply, CONTROL_REPLY_SIZE);
+    }
+}
+
 static void do_quit(const struct command *const c)
 {
     (void)c;
@@ -125,9 +137,14 @@ static const struct {
     unsigned words;
     void (*run)(const struct command *command);
 } commands[] = {
-    {"faults", 2, do_faults}, {"freeze", 2, do_freeze}, {"power-cycle", 1, do_power_cycle},
-    {"drive", 3, do_drive},   {"pad", 2, do_pad},       {"stats", 1, do_stats},
+    {"faults", 2, do_faults},
+    {"freeze", 2, do_freeze},
+    {"power-cycle", 1, do_power_cycle},
+    {"drive", 3, do_drive},
+    {"pad", 2, do_pad},
+    {"stats", 1, do_stats},
     {"quit", 1, do_quit},
+    {"remote", ANY_WORDS, do_remote},
 };
 
 /* "card N" in front names one card; else a command is for all of them. */
@@ -161,13 +178,14 @@ bool control_command(char *const text, struct station *const stations, const uns
     for (char *word; (word = strtok_r(rest, " \t\r\n", &state)) && c.count < MAX_WORDS; rest = NULL)
         c.words[c.count++] = word;
     for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
-        if (c.count == 0 || c.count != commands[i].words || strcmp(c.words[0], commands[i].name) != 0)
+        const bool fits = c.count == commands[i].words || commands[i].words == ANY_WORDS;
+        if (c.count == 0 || !fits || strcmp(c.words[0], commands[i].name) != 0)
             continue;
         commands[i].run(&c);
         return commands[i].run == do_quit;
     }
     answer(&c, "error: commands are: [card N] faults LIST, freeze on|off, power-cycle, drive IO 0|1|z|h, pad IO, "
-               "stats, quit");
+               "remote PORT:CHANNEL ..., stats, quit");
     return false;
 }
 

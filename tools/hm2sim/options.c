@@ -13,6 +13,8 @@
 
 #include <hm2/lbp16.h>
 
+#include "sserial.h"
+
 #define NS_PER_S              1e9
 #define NS_PER_MS             1e6
 #define NS_PER_US             1e3
@@ -317,6 +319,34 @@ static int add_pattern(struct reading *const r, const char *const value)
     return 0;
 }
 
+static const char *find_name(const char *const *names, const char *const name)
+{
+    for (; *names; names++)
+        if (strcmp(*names, name) == 0)
+            return *names;
+    return NULL;
+}
+
+/* PORT:CHANNEL=CARD */
+static int add_remote(struct reading *const r, const char *const value)
+{
+    static const char wanted[] = "PORT:CHANNEL=CARD, such as 0:0=7i77, with a card that hm2sim --help lists";
+    unsigned long port, channel;
+    const char *at;
+    if (!read_unsigned(value, UINT8_MAX, &at, &port) || *at != ':' ||
+        !read_unsigned(at + 1, UINT8_MAX, &at, &channel) || *at != '=')
+        return refuse(r, "--remote", value, wanted);
+    const char *card = find_name(sim_sserial_cards(), at + 1);
+    if (!card)
+        card = find_name(remote_names(), at + 1);
+    if (!card)
+        return refuse(r, "--remote", value, wanted);
+    if (r->card->remote_count == MAX_REMOTES)
+        return refuse(r, "--remote", value, "at most 32 remotes a card");
+    r->card->remotes[r->card->remote_count++] = (struct remote_option){(unsigned)port, (unsigned)channel, card};
+    return 0;
+}
+
 /* ---- faults -------------------------------------------------------------------------------------------------------
  */
 
@@ -381,6 +411,7 @@ enum {
     OPT_INDEX,
     OPT_SWITCH,
     OPT_DRIVE,
+    OPT_REMOTE,
     OPT_MAC,
     OPT_LATENCY,
     OPT_REALTIME,
@@ -405,6 +436,7 @@ static const struct option long_options[] = {
     {"index", required_argument, NULL, OPT_INDEX},
     {"switch", required_argument, NULL, OPT_SWITCH},
     {"drive", required_argument, NULL, OPT_DRIVE},
+    {"remote", required_argument, NULL, OPT_REMOTE},
     {"mac", required_argument, NULL, OPT_MAC},
     {"latency", no_argument, NULL, OPT_LATENCY},
     {"realtime", optional_argument, NULL, OPT_REALTIME},
@@ -449,7 +481,11 @@ static void print_help(void)
           "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
           "  --switch IO:AXIS:POSITION:LEVELS  below the position of stepgen.N or encoder.N one level, then another\n"
           "  --drive IO:LEVELS[:MS]  0, 1, z (floating), h (pulled up), MS milliseconds each\n"
-          "\n"
+          "  --remote PORT:CHANNEL=CARD  a smart-serial card there. Cards:",
+          stdout);
+    for (const char *const *card = sim_sserial_cards(); *card; card++)
+        printf(" %s", *card);
+    fputs("\n\n"
           "When all cards listen, one line \"ready CARD@ADDRESS:PORT ...\" is printed. SIGINT and SIGTERM end it.\n",
           stdout);
 }
@@ -501,6 +537,8 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_index(r, value);
     case OPT_SWITCH:
         return add_switch(r, value);
+    case OPT_REMOTE:
+        return add_remote(r, value);
     default:
         return add_pattern(r, value);
     }

@@ -12,6 +12,7 @@
 #define MAX_CARDS    32u
 #define MAX_WIRES    32u
 #define MAX_PATTERNS 32u
+#define MAX_REMOTES  32u
 #define PATTERN_BITS 64u
 
 struct wire {
@@ -27,6 +28,12 @@ struct follower {
 struct motor {
     unsigned encoder, pwmgen;
     int32_t counts_per_s; /* at full duty */
+};
+
+/* A card at a smart-serial port. */
+struct remote_option {
+    unsigned port, channel;
+    const char *card; /* one of sim_sserial_cards() or remote_names() */
 };
 
 struct encoder_index {
@@ -57,13 +64,14 @@ struct card_options {
     uint16_t port;
     const char *firmware; /* file */
     uint8_t mac[6];
-    unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count;
+    unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count, remote_count;
     struct wire wires[MAX_WIRES];
     struct follower followers[MAX_WIRES];
     struct motor motors[MAX_WIRES];
     struct encoder_index indices[MAX_WIRES];
     struct position_switch switches[MAX_WIRES];
     struct pattern patterns[MAX_PATTERNS];
+    struct remote_option remotes[MAX_REMOTES];
 };
 
 struct options {

@@ -10,6 +10,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "remotes.h"
+
 #define MAX_FIRMWARE_BYTES (1u << 20)
 #define WIRED_STEP_NS \
     5000000 /* edges on wires and of switches are made at least this often, not all at the next packet */
@@ -178,6 +180,8 @@ int station_open(struct station *const s, const struct options *const options, c
         err = sim_net_new(&s->net, s->card, &faults);
     if (!err)
         err = connect_pins(s, diag);
+    if (!err)
+        err = remotes_connect(s->card, card, seed, diag);
     if (!err)
         err = axes_connect(&s->axes, card, s->card, diag);
     if (!err)

@@ -47,6 +47,9 @@ struct hm2_config {
     char sserial_mode[HM2_CFG_SSERIAL_PORTS][HM2_CFG_SSERIAL_CHANNELS]; /* '0'..'9', 'x', default '0' */
     bool sserial_port_given[HM2_CFG_SSERIAL_PORTS];
     bool sserial_port_used[HM2_CFG_SSERIAL_PORTS]; /* a token with at least one digit was seen */
+    uint8_t sserial_named[HM2_CFG_SSERIAL_PORTS];  /* channels that the token names; the rest have their default */
+    int sserial_baudrate;                          /* -1 = as the firmware has it */
+    bool use_serial_numbers;                       /* names of smart-serial remotes by unit number */
     char ssi_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];
     char biss_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];
     char fanuc_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];

@@ -38,10 +38,18 @@ enum hm2_notice {
     HM2_NOTICE_VALUE_CLAMPED, /* a point was out of range and was rewritten */
     HM2_NOTICE_VALUE_INVALID, /* a point was NaN or impossible; a safe value is used */
     HM2_NOTICE_QUAD_ERROR,
-    HM2_NOTICE_TIMEOUT_SHORT,  /* watchdog time-out below 1.5 periods */
-    HM2_NOTICE_TABLE_TOO_LONG, /* step table longer than 16 or wider than the pins */
-    HM2_NOTICE_HEADROOM,       /* command needs more than maxvel/maxaccel allow */
-    HM2_NOTICE_DUMP_STATE,     /* a person asked for a listing of all modules (raw.dump_state) */
+    HM2_NOTICE_TIMEOUT_SHORT,      /* watchdog time-out below 1.5 periods */
+    HM2_NOTICE_TABLE_TOO_LONG,     /* step table longer than 16 or wider than the pins */
+    HM2_NOTICE_HEADROOM,           /* command needs more than maxvel/maxaccel allow */
+    HM2_NOTICE_DUMP_STATE,         /* a person asked for a listing of all modules (raw.dump_state) */
+    HM2_NOTICE_REMOTE_LOST,        /* smart serial; value: channel. Too many failures, the remote is stopped */
+    HM2_NOTICE_REMOTE_NOT_STARTED, /* START failed on it */
+    HM2_NOTICE_REMOTE_OTHER,       /* another remote answers than at load */
+    HM2_NOTICE_REMOTE_BACK,        /* it answers again and is driven again */
+    HM2_NOTICE_REMOTE_FAULT,       /* it reports faults; value: the fault byte */
+    HM2_NOTICE_PORT_STOPPED,       /* the whole port */
+    HM2_NOTICE_PORT_LATE,          /* a transfer was not finished when the next cycle came */
+    HM2_NOTICE_PARAMETER_REFUSED,  /* value: channel */
     HM2_NOTICES
 };
 
@@ -69,6 +77,7 @@ struct hm2_setup {
     /* One confirmed register access at load time. 0 or the link's error. Undriven registers read 0 or all ones. */
     int (*peek)(struct hm2_setup *setup, uint16_t address, unsigned words, uint32_t *values);
     int (*poke)(struct hm2_setup *setup, uint16_t address, unsigned words, const uint32_t *values);
+    int64_t (*now_ns)(const struct hm2_setup *setup); /* the link's clock, for limits of waiting */
 };
 
 /* Accepted descriptor (hal-interface 1.5). */
@@ -138,6 +147,9 @@ HM2_API void hm2_notice_point(const struct hm2_module *module, enum hm2_notice n
 HM2_API int HM2_MUST_CHECK hm2_claim_pins(const struct hm2_module *module, struct hm2_setup *setup, uint8_t gtag,
                                           unsigned units, bool immediate,
                                           bool (*filter)(const struct hm2_pd *pd, const struct hm2_setup *setup));
+/* The same for one pin. */
+HM2_API int HM2_MUST_CHECK hm2_claim_pin(const struct hm2_module *module, const struct hm2_setup *setup, unsigned io,
+                                         bool immediate);
 
 /* Every module type this library knows, in the order in which a board sets them up, unpacks and packs them. Ports come
  * behind all types that claim pins, because they offer as GPIO what nobody claimed. A type whose gtag is HM2_GTAG_NONE

@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * 7I77 and 7I77D: a processor for the field I/O (32 inputs, 16 outputs, four of the inputs measured, field voltage, two
+ * MPG counters; seed 003, "SOFTWARE PROCESS DATA MODES") and one for six analog outputs and their enables.
+ * Names of fields and modes are those that LinuxCNC's users have as pins; the manual does not print them.
+ */
+#include "remote_kind.h"
+
+#define COUNT(array) (sizeof(array) / sizeof(array)[0])
+#define FULL_SCALE_V 36.3f /* of analog inputs (seed 003, "ANALOG INPUTS") */
+
+enum { ALL_MODES = 0xF, ANALOG_MODES = 0xE, VOLTAGE_MODES = 0xC, MPG_MODE = 0x8 };
+
+static const struct remote_field field_fields[] = {
+    {"Input", "", 32, REMOTE_BITS, REMOTE_IN, ALL_MODES, REMOTE_AT_INPUTS, 0, 0},
+    {"Output", "", 16, REMOTE_BITS, REMOTE_OUT, ALL_MODES, REMOTE_AT_OUTPUTS, 0, 0},
+    {"AnalogIn0", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, ANALOG_MODES, REMOTE_AT_INPUTS + 4, 0, FULL_SCALE_V},
+    {"AnalogIn1", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, ANALOG_MODES, REMOTE_AT_INPUTS + 5, 0, FULL_SCALE_V},
+    {"AnalogIn2", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, ANALOG_MODES, REMOTE_AT_INPUTS + 6, 0, FULL_SCALE_V},
+    {"AnalogIn3", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, ANALOG_MODES, REMOTE_AT_INPUTS + 7, 0, FULL_SCALE_V},
+    {"FieldVoltage", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, VOLTAGE_MODES, REMOTE_AT_INPUTS + 8, 0, FULL_SCALE_V},
+    {"Enc0", "", 8, REMOTE_ENCODER, REMOTE_IN, MPG_MODE, REMOTE_AT_INPUTS + 9, 0, 0},
+    {"Enc1", "", 8, REMOTE_ENCODER, REMOTE_IN, MPG_MODE, REMOTE_AT_INPUTS + 10, 0, 0},
+};
+
+static const char *const field_modes[] = {"IO_Only", "IO_Ana", "IO_Ana_FV", "IO_Enc_Ana_FV"};
+
+const struct remote_kind remote_7i77_field = {
+    .name = "7i77-field",
+    .card = "7I77",
+    .unit_class = 0x12,
+    .field_power = true,
+    .fields = field_fields,
+    .field_count = COUNT(field_fields),
+    .modes = field_modes,
+    .mode_count = COUNT(field_modes),
+    .layout = REMOTE_LAYOUT,
+};
+
+const struct remote_kind remote_7i77d_field = {
+    .name = "7i77d-field",
+    .card = "7I77",
+    .unit_class = 0x12,
+    .sinking = true,
+    .field_power = true,
+    .fields = field_fields,
+    .field_count = COUNT(field_fields),
+    .modes = field_modes,
+    .mode_count = COUNT(field_modes),
+    .layout = REMOTE_LAYOUT,
+};
+
+/* 13 bits each (seed 003, "ANALOG OUTPUTS": resolution), which is also what three registers have room for. */
+#define ANALOG_OUT(name, number)                                                                   \
+    {                                                                                              \
+        name, "Volts", 13, REMOTE_SIGNED, REMOTE_OUT, 1, REMOTE_AT_OUTPUTS + 2 * (number), -10, 10 \
+    }
+
+static const struct remote_field analog_fields[] = {
+    ANALOG_OUT("AnalogOut0", 0),
+    ANALOG_OUT("AnalogOut1", 1),
+    ANALOG_OUT("AnalogOut2", 2),
+    ANALOG_OUT("AnalogOut3", 3),
+    ANALOG_OUT("AnalogOut4", 4),
+    ANALOG_OUT("AnalogOut5", 5),
+    {"AnalogEna", "", 1, REMOTE_BOOLEAN, REMOTE_OUT, 1, REMOTE_AT_OUTPUTS + 12, 0, 0},
+    {"SpinEna", "", 1, REMOTE_BOOLEAN, REMOTE_OUT, 1, REMOTE_AT_OUTPUTS + 13, 0, 0},
+};
+
+static const char *const analog_modes[] = {"Analog"};
+
+const struct remote_kind remote_7i77_analog = {
+    .name = "7i77-analog",
+    .card = "7I77",
+    .unit_class = 0x11,
+    .fields = analog_fields,
+    .field_count = COUNT(analog_fields),
+    .modes = analog_modes,
+    .mode_count = COUNT(analog_modes),
+    .layout = REMOTE_LAYOUT,
+};

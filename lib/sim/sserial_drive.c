@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Motors whose drives take their speed from an analog output of a remote. In closed form from one change to the next.
+ */
+#include <math.h>
+
+#include "sim_qcounter.h"
+#include "sserial_state.h"
+
+#define POSITION_ONE 4294967296.0 /* of a follower's position: a second at full speed */
+#define UNIT_SHIFT   8u           /* a follower's unit: drive, and the module's place in tags */
+
+static const uint8_t tags[] = {HM2_GTAG_SSERIAL, HM2_GTAG_SSERIALB};
+
+static double speed_wanted(const struct sserial *const s, const struct sim_drive *const d)
+{
+    struct remote *const r = s->ports[d->port].channels[d->channel].remote;
+    double enabled = 1, fraction = 0;
+    if (d->enable && remote_get(r, d->enable, &enabled))
+        return 0;
+    if (enabled == 0 || remote_fraction(r, d->output, &fraction))
+        return 0;
+    return fraction;
+}
+
+static void turn(const struct sserial *const s, struct sserial_drive *const d, const double seconds)
+{
+    const double wanted = speed_wanted(s, &d->drive);
+    const double tau = d->drive.time_constant_s;
+    const double rest = tau > 0 ? exp(-seconds / tau) : 0;
+    d->turned += wanted * seconds + (d->velocity - wanted) * tau * (1 - rest);
+    d->velocity = wanted + (d->velocity - wanted) * rest;
+}
+
+void sserial_turn(struct sim_module *const m, const int64_t clk)
+{
+    struct sserial *const s = m->state;
+    for (unsigned i = 0; i < s->drive_count; i++) {
+        struct sserial_drive *const d = &s->drives[i];
+        if (clk <= d->at)
+            continue;
+        turn(s, d, (double)(clk - d->at) / sim_clock_low_hz(m->card));
+        d->at = clk;
+    }
+}
+
+/* For sim_follow. */
+static int64_t position(struct sim_card *const card, const unsigned unit)
+{
+    struct sim_module *const m = sim_find(card, tags[unit >> UNIT_SHIFT]);
+    if (!m)
+        return 0;
+    sserial_turn(m, m->clk);
+    const struct sserial *const s = m->state;
+    return (int64_t)floor(s->drives[unit & 0xFFu].turned * POSITION_ONE);
+}
+
+int sim_card_drive_motor(struct sim_card *const card, const unsigned encoder, const struct sim_drive *const drive)
+{
+    struct sim_drive local = *drive;
+    double unused;
+    struct sim_module *const m = sserial_module(card, &local.port);
+    struct remote *const r = sim_sserial_remote(card, drive->port, drive->channel);
+    if (!m || !r || remote_fraction(r, drive->output, &unused) ||
+        (drive->enable && remote_get(r, drive->enable, &unused)))
+        return HM2_ERR_NOTFOUND;
+    if (!(drive->time_constant_s >= 0) || drive->time_constant_s > 1000)
+        return HM2_ERR_RANGE;
+    struct sserial *const s = m->state;
+    if (s->drive_count == SSERIAL_MAX_DRIVES)
+        return HM2_ERR_NOSPACE;
+    const unsigned place = m->md.gtag == tags[0] ? 0 : 1;
+    s->drives[s->drive_count] = (struct sserial_drive){.drive = local, .at = m->clk};
+    const struct sim_follow follow = {position, .unit = place << UNIT_SHIFT | s->drive_count,
+                                      .num = drive->counts_per_s, .den = 1};
+    const int err = sim_qc_follow(card, encoder, &follow);
+    if (!err)
+        s->drive_count++;
+    return err;
+}
