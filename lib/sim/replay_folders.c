@@ -237,6 +237,9 @@ static const struct replay_signal pktuart_signals[] = {
     {"tx", REPLAY_OUTPUT, HM2_GTAG_PKTUART_TX, 0x81, 0},
     {"txen", REPLAY_OUTPUT, HM2_GTAG_PKTUART_TX, 0x82, 0},
     {"rx", REPLAY_INPUT, HM2_GTAG_PKTUART_RX, 0x01, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
 /* ---- absolute encoders ---------------------------------------------------------------------------------------------
  */
 
@@ -284,6 +287,14 @@ static const struct replay_signal fabs_signals[] = {
     {NULL, REPLAY_PAD, 0, 0, 0},
 };
 
+/* ---- sslbp --------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register sslbp_registers[] = {
+    {"command", 0x5A00, 0}, {"data", 0x5B00, 0},   {"cs", 0x5C00, 4}, {"user0_", 0x5D00, 4},
+    {"user1_", 0x5E00, 4},  {"user2_", 0x5F00, 4}, {NULL, 0, 0},
+};
+
 /* ---- before a test
  * ---------------------------------------------------------------------------------------------------- */
 
@@ -302,14 +313,6 @@ static int inputs_low(struct replay_run *const run)
 
 /* ---- the kinds -----------------------------------------------------------------------------------------------------
  */
-
-/* ---- sslbp --------------------------------------------------------------------------------------------------------
- */
-
-static const struct replay_register sslbp_registers[] = {
-    {"command", 0x5A00, 0}, {"data", 0x5B00, 0},   {"cs", 0x5C00, 4}, {"user0_", 0x5D00, 4},
-    {"user1_", 0x5E00, 4},  {"user2_", 0x5F00, 4}, {NULL, 0, 0},
-};
 
 const struct replay_kind replay_kinds[] = {
     {.folder = "stepgen",

@@ -17,7 +17,6 @@ struct replay_event {
     unsigned line;
     char kind; /* I W R E N J # */
     unsigned char part; /* of a clock, in hundredths */
-    char kind;          /* I W R E N # */
 };
 
 struct replay_test {

@@ -109,6 +109,16 @@ struct link_udp_options {
 HM2_API int HM2_MUST_CHECK link_udp_open(struct link **link, const struct link_udp_options *options,
                                          struct hm2_diag *diag);
 
+/* ---- serial port ------------------------------------------------------------------------------------------------ */
+
+/* Open a serial port for this program alone: raw, 8N1, without flow control. Not realtime safe; closing restores its
+ * settings. HM2_ERR_STATE = another program has it, HM2_ERR_RANGE = no such baud rate, HM2_ERR_IO, HM2_ERR_INVALID;
+ * diag says why.
+ *
+ * A serial line has no datagrams: send() hands all bytes to the port at once, recv() returns what has arrived, at least
+ * one byte and at most cap, and never HM2_ERR_NOSPACE. A port that is gone is HM2_ERR_IO. Clock: CLOCK_MONOTONIC. */
+HM2_API int HM2_MUST_CHECK link_tty_open(struct link **link, const char *path, uint32_t baud, struct hm2_diag *diag);
+
 /* ---- mock: scripted exchanges in virtual time ------------------------------------------------------------------ */
 
 /* One reply that a mock gives. delay_ns counts from the send that it answers. */
