@@ -1,25 +1,20 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "flash_rig.h"
 
-#define FALLBACK_XILINX 0x10000u
-
-static void deliver(struct flash_rig *const rig)
+void flash_rig_take(struct flash_rig *const rig, const struct sim_flash_file *const file)
 {
-    rig->flash = sim_card_flash(rig->sim, &rig->flash_bytes);
-    flash_rig_image(rig, 99, true);
-    memcpy(rig->flash + (rig->xilinx ? FALLBACK_XILINX : 0), rig->image.payload, rig->image.payload_bytes);
-    if (rig->xilinx)
-        flash_boot_block(flash_chip_of_id(0x14), rig->flash);
+    struct sim_flash_file own = *file;
+    if (!own.profile)
+        own.profile = rig->xilinx ? "7i93" : "7i96s";
+    rig->len = sim_flash_file(&own, rig->file, SIM_FLASH_FILE_BYTES);
+    assert_int_not_equal(rig->len, 0);
+    if (flash_image_parse(rig->file, rig->len, &rig->image, &rig->diag) != 0)
+        fail_msg("%s", rig->diag.text);
 }
 
 void flash_rig_image(struct flash_rig *const rig, const uint64_t seed, const bool fallback)
 {
-    if (rig->xilinx)
-        rig->len = make_xilinx(&(struct xilinx_file){.seed = seed}, rig->file);
-    else
-        rig->len = make_efinix(&(struct efinix_file){.seed = seed, .fallback = fallback}, rig->file);
-    if (flash_image_parse(rig->file, rig->len, &rig->image, &rig->diag) != 0)
-        fail_msg("%s", rig->diag.text);
+    flash_rig_take(rig, &(struct sim_flash_file){.seed = seed, .area = fallback ? SIM_AREA_FALLBACK : SIM_AREA_USER});
     rig->options.file_name = rig->xilinx ? fallback ? "7i93_fallback.bit" : "7i93_test.bit" : "7i96s_test.bin";
 }
 
@@ -27,14 +22,14 @@ static int make(void **const state, const char *const profile)
 {
     struct flash_rig *const rig = calloc(1, sizeof *rig);
     assert_non_null(rig);
-    rig->file = malloc(FLASH_IMAGE_MOST);
+    rig->file = malloc(SIM_FLASH_FILE_BYTES);
     assert_non_null(rig->file);
     rig->xilinx = strcmp(profile, "7i96s") != 0;
     const struct sim_card_options options = {.profile = profile, .seed = 1};
     if (sim_card_new(&rig->sim, &options, &rig->diag) != 0)
         fail_msg("%s", rig->diag.text);
     assert_int_equal(sim_net_new(&rig->net, rig->sim, NULL), 0);
-    deliver(rig);
+    rig->flash = sim_card_flash(rig->sim, &rig->flash_bytes);
     flash_rig_image(rig, 1, false);
     flash_rig_reopen(rig);
     *state = rig;

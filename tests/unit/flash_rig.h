@@ -6,9 +6,7 @@
 #include "unit.h"
 
 #include <hm2/flash.h>
-#include <hm2/sim.h>
-
-#include "flash_images.h"
+#include <hm2/sim_flash.h>
 
 #define RIG_USER   0x100000u /* start of the user area of a 16 Mbit chip */
 #define RIG_SECTOR 65536u
@@ -33,8 +31,9 @@ int flash_rig_7i93(void **state);
 int flash_rig_7i96s(void **state);
 int flash_rig_free(void **state);
 
-/* Make another image the one to be written. */
+/* Make another image the one to be written: a good one from a seed, or any. */
 void flash_rig_image(struct flash_rig *rig, uint64_t seed, bool fallback);
+void flash_rig_take(struct flash_rig *rig, const struct sim_flash_file *file);
 /* Plan and run a write; its error. */
 int flash_rig_write(struct flash_rig *rig);
 /* The same, which must succeed. */
