@@ -61,7 +61,7 @@ struct sim_card {
 };
 
 /* card.c */
-void sim_sync(struct sim_module *m); /* advance to the card's present clk */
+void sim_sync(struct sim_module *m);         /* advance to the card's present clk */
 void sim_card_reload(struct sim_card *card); /* as the ICAP asked */
 
 /* pins.c */

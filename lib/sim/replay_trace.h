@@ -15,7 +15,7 @@ struct replay_event {
     int64_t at; /* clock, or nanosecond when the trace has them */
     const char *name, *value;
     unsigned line;
-    char kind; /* I W R E N J # */
+    char kind;          /* I W R E N J # */
     unsigned char part; /* of a clock, in hundredths */
 };
 

@@ -155,8 +155,8 @@ static struct spread distance(const unsigned joint, const unsigned count, const 
 }
 
 /* What read() sees was commanded by the write of the cycle before: exactly one period of lag. Apart from that the
- * axis is where the thread's lateness lets it be: speed times time. How late that is on a busy machine is no fault here,
- * so only most cycles have a limit. */
+ * axis is where the thread's lateness lets it be: speed times time. How late that is on a busy machine is no fault
+ * here, so only most cycles have a limit. */
 static void check_follows(const unsigned joint, const unsigned count)
 {
     const double pi = acos(-1);

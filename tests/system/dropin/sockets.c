@@ -224,7 +224,8 @@ int getifaddrs(struct ifaddrs **const list)
 {
     static char name[] = "hm2sim";
     static struct sockaddr_in address;
-    static struct ifaddrs one = {.ifa_name = name, .ifa_flags = IFF_UP | IFF_LOOPBACK, .ifa_addr = (struct sockaddr *)&address};
+    static struct ifaddrs one = {
+        .ifa_name = name, .ifa_flags = IFF_UP | IFF_LOOPBACK, .ifa_addr = (struct sockaddr *)&address};
     address = (struct sockaddr_in){.sin_family = AF_INET, .sin_addr.s_addr = inet_addr(HOST_IP)};
     *list = &one;
     return 0;
