@@ -97,7 +97,7 @@ static int transfer(const struct lbp_remote *const remote, const struct sslbp_fi
     const unsigned bytes = bytes_of(field);
     uint64_t value = 0;
     int err = 0;
-    for (unsigned done = 0, size = 0; !err && done < bytes; done += size) {
+    for (unsigned done = 0, size = 0; !err && done < bytes && done < sizeof value; done += size) {
         const uint16_t address = (uint16_t)(field->address + done);
         uint64_t part = *raw >> 8u * done;
         size = piece(bytes - done);

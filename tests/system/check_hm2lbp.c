@@ -201,9 +201,9 @@ END_TEST
 static const char *make_file(const char *const name, const size_t len, const int fill)
 {
     static char path[128];
-    snprintf(path, sizeof path, "/tmp/check-hm2lbp-%d", (int)getpid());
-    ck_assert_int_eq(mkdtemp(strcat(path, "XXXXXX")) == NULL, 0);
-    strcat(strcat(path, "/"), name);
+    char folder[] = "/tmp/check-hm2lbp-XXXXXX";
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/%s", folder, name);
     FILE *const file = fopen(path, "wb");
     ck_assert_ptr_nonnull(file);
     for (size_t i = 0; i < len; i++)

@@ -23,7 +23,7 @@ static void plug(const char *const name, const uint32_t serial)
 /* Send a message; its answer must be this ("" = none). */
 static void say(const char *const message, const char *const expected)
 {
-    uint8_t bytes[64], wanted[64], answer[LBP_MESSAGE_BYTES];
+    uint8_t bytes[64], wanted[64], answer[LBP_MESSAGE_BYTES] = {0};
     const size_t len = hex_bytes(message, bytes, sizeof bytes), want = hex_bytes(expected, wanted, sizeof wanted);
     size_t got = 0;
     for (size_t i = 0; i < len; i++) {
