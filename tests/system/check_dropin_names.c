@@ -118,6 +118,13 @@ static bool load(const struct load *const load, const char *const driver)
 /* ---- what halcmd shows --------------------------------------------------------------------------------------------
  */
 
+/* The heading may stand behind the piece of a line that a driver was just printing. */
+static bool is_heading(const char *const line, const char *const heading)
+{
+    const size_t len = strlen(line), wanted = strlen(heading);
+    return len >= wanted && strcmp(line + len - wanted, heading) == 0;
+}
+
 /* One line of a listing, by its heading; false for what is no object. */
 static bool parse(const char kind, const char *const line, struct object *const o)
 {
@@ -151,7 +158,7 @@ static void read_listing(struct listing *const listing)
     for (char *line = strtok(run.text, "\n"); line; line = strtok(NULL, "\n")) {
         struct object object;
         for (size_t i = 0; i < sizeof headings / sizeof headings[0]; i++)
-            if (strcmp(line, headings[i].text) == 0)
+            if (is_heading(line, headings[i].text))
                 kind = headings[i].kind;
         if (!parse(kind, line, &object))
             continue;
