@@ -485,6 +485,7 @@ static void take_outputs(struct remote *const r, const uint8_t *const out)
 
 void remote_exchange(struct remote *const r, const int64_t now_ns, const uint8_t *const out, uint8_t *const in)
 {
+    remote_advance(r, now_ns);
     remote_feed(r, now_ns);
     give_inputs(r, in + 1);
     take_outputs(r, out);
@@ -509,7 +510,6 @@ void remote_advance(struct remote *const r, const int64_t now_ns)
 
 void remote_feed(struct remote *const r, const int64_t now_ns)
 {
-    remote_advance(r, now_ns);
     r->fed_ns = now_ns;
 }
 
@@ -576,13 +576,22 @@ int remote_get(struct remote *const r, const char *const name, double *const val
     return 0;
 }
 
-int remote_fraction(struct remote *const r, const char *const name, double *const fraction)
+static bool enabled(const struct remote *const r, const struct remote_field *const output)
 {
     unsigned index;
-    const struct remote_field *const field = find_field(r->kind, name, &index);
+    for (unsigned i = 0; i < r->kind->enable_count; i++)
+        if (strcmp(r->kind->enables[i].output, output->name) == 0)
+            return applied(r, find_field(r->kind, r->kind->enables[i].enable, &index)) != 0;
+    return true;
+}
+
+int remote_speed(const struct remote *const r, const char *const output, double *const speed)
+{
+    unsigned index;
+    const struct remote_field *const field = find_field(r->kind, output, &index);
     if (!field || !is_number(field) || !from_host(field) || field->modes == 0)
         return HM2_ERR_NOTFOUND;
-    *fraction = scaled(field, applied(r, field)) / (double)field->max;
+    *speed = enabled(r, field) ? scaled(field, applied(r, field)) / (double)field->max : 0;
     return 0;
 }
 

@@ -67,7 +67,8 @@ void remote_set_nv_access(struct remote *remote, uint8_t memory);
 uint8_t remote_read(struct remote *remote, uint16_t address);
 bool remote_write(struct remote *remote, uint16_t address, uint8_t value);
 
-/* Any communication keeps the watchdog from biting. */
+/* Any communication keeps the watchdog from biting; one that has bitten by then must have been told (remote_advance()).
+ */
 void remote_feed(struct remote *remote, int64_t now_ns);
 /* RPC BD: out has remote_out_bytes(), in gets the fault byte and remote_in_bytes(). Inputs are sampled before the
  * outputs take their new values, as recorded. Feeds the watchdog. */
@@ -90,8 +91,8 @@ int64_t remote_bite_ns(const struct remote *remote);
  */
 int HM2_MUST_CHECK remote_set(struct remote *remote, const char *field, double value);
 int HM2_MUST_CHECK remote_get(struct remote *remote, const char *field, double *value);
-/* An output as part of its full scale, -1 to 1. */
-int HM2_MUST_CHECK remote_fraction(struct remote *remote, const char *field, double *fraction);
+/* The speed that a drive at a numeric output is told, as part of full scale, -1 to 1; 0 while its enable is off. */
+int HM2_MUST_CHECK remote_speed(const struct remote *remote, const char *output, double *speed);
 /* Terminal of a field output: high or floating, of sinking cards low or floating. SIM_FLOAT when there is none. */
 enum sim_level remote_terminal(struct remote *remote, unsigned output);
 /* Outputs (bits) that are shorted: they trip as soon as they are on. */

@@ -24,6 +24,8 @@ static const struct remote_field fields[] = {
     {"Enc1", "", 8, REMOTE_ENCODER, REMOTE_IN, MPG_MODE, REMOTE_AT_INPUTS + 10, 0, 0},
 };
 
+static const struct remote_enable enables[] = {{"SpinOut", "SpinEna"}};
+
 static const char *const modes[] = {"IO_Spin", "IO_Ana_Spin", "IO_Enc_Ana_Spin_FV"};
 
 const struct remote_kind remote_7i76 = {
@@ -35,5 +37,7 @@ const struct remote_kind remote_7i76 = {
     .field_count = COUNT(fields),
     .modes = modes,
     .mode_count = COUNT(modes),
+    .enables = enables,
+    .enable_count = COUNT(enables),
     .layout = REMOTE_LAYOUT,
 };

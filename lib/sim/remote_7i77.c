@@ -67,6 +67,12 @@ static const struct remote_field analog_fields[] = {
     {"SpinEna", "", 1, REMOTE_BOOLEAN, REMOTE_OUT, 1, REMOTE_AT_OUTPUTS + 13, 0, 0},
 };
 
+/* Five enables are switched in common, the sixth by itself (seed 003, "SERVO ENABLE OUTPUTS"). */
+static const struct remote_enable enables[] = {
+    {"AnalogOut0", "AnalogEna"}, {"AnalogOut1", "AnalogEna"}, {"AnalogOut2", "AnalogEna"},
+    {"AnalogOut3", "AnalogEna"}, {"AnalogOut4", "AnalogEna"}, {"AnalogOut5", "SpinEna"},
+};
+
 static const char *const analog_modes[] = {"Analog"};
 
 const struct remote_kind remote_7i77_analog = {
@@ -77,5 +83,7 @@ const struct remote_kind remote_7i77_analog = {
     .field_count = COUNT(analog_fields),
     .modes = analog_modes,
     .mode_count = COUNT(analog_modes),
+    .enables = enables,
+    .enable_count = COUNT(enables),
     .layout = REMOTE_LAYOUT,
 };

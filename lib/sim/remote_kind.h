@@ -44,6 +44,11 @@ struct remote_field {
     float min, max;
 };
 
+/* A drive takes its speed from one output and its enable from another. */
+struct remote_enable {
+    const char *output, *enable;
+};
+
 /* Where the tables lie. */
 struct remote_layout {
     uint16_t ptoc, ptoc_step; /* from mode to mode */
@@ -64,6 +69,8 @@ struct remote_kind {
     unsigned field_count;
     const char *const *modes; /* software modes; there is one hardware mode */
     unsigned mode_count;
+    const struct remote_enable *enables;
+    unsigned enable_count;
     struct remote_layout layout;
 };
 

@@ -193,6 +193,7 @@ static void advance(struct sim_module *const m, const int64_t clk)
 {
     struct muxed *const x = m->state;
     int64_t from = m->clk;
+    sim_qc_bank_follow(m, &x->bank, clk); /* first: the edges below make what the bus sees */
     const int64_t sample = sim_qc_bank_sample_edge(m, &x->bank, clk);
     if (sample >= from) {
         run(x, from, sample);
@@ -201,7 +202,6 @@ static void advance(struct sim_module *const m, const int64_t clk)
     }
     run(x, from, clk);
     m->clk = clk;
-    sim_qc_bank_follow(m, &x->bank, clk);
 }
 
 static int64_t next_event(struct sim_module *const m)

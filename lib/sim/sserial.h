@@ -29,13 +29,14 @@ int HM2_MUST_CHECK sim_sserial_error(struct sim_card *card, unsigned port, unsig
 
 /*
  * A drive and motor at an analog output of a remote, with an encoder of the card (plain or multiplexed) on the shaft.
- * Speed goes to counts_per_s at full output with a time constant, and to 0 while the drive is not enabled.
+ * Speed goes to counts_per_s at full output with a time constant, and to 0 while the enable output of the drive is off
+ * or the remote has a fault.
  */
 struct sim_drive {
     unsigned port, channel;
-    const char *output, *enable; /* fields of the remote; enable may be NULL. Kept: must outlive the card */
-    int32_t counts_per_s;        /* at 10 V, or 100 % */
-    double time_constant_s;      /* of its inertia; 0 = none */
+    const char *output;     /* field of the remote, such as "AnalogOut0". Kept: must outlive the card */
+    int32_t counts_per_s;   /* at full output; negative turns it round */
+    double time_constant_s; /* of its inertia; 0 = none */
 };
 
 int HM2_MUST_CHECK sim_card_drive_motor(struct sim_card *card, unsigned encoder, const struct sim_drive *drive);

@@ -13,13 +13,9 @@ static const uint8_t tags[] = {HM2_GTAG_SSERIAL, HM2_GTAG_SSERIALB};
 
 static double speed_wanted(const struct sserial *const s, const struct sim_drive *const d)
 {
-    struct remote *const r = s->ports[d->port].channels[d->channel].remote;
-    double enabled = 1, fraction = 0;
-    if (d->enable && remote_get(r, d->enable, &enabled))
-        return 0;
-    if (enabled == 0 || remote_fraction(r, d->output, &fraction))
-        return 0;
-    return fraction;
+    double speed = 0;
+    (void)!remote_speed(s->ports[d->port].channels[d->channel].remote, d->output, &speed); /* tried when it was made */
+    return speed;
 }
 
 static void turn(const struct sserial *const s, struct sserial_drive *const d, const double seconds)
@@ -59,9 +55,8 @@ int sim_card_drive_motor(struct sim_card *const card, const unsigned encoder, co
     struct sim_drive local = *drive;
     double unused;
     struct sim_module *const m = sserial_module(card, &local.port);
-    struct remote *const r = sim_sserial_remote(card, drive->port, drive->channel);
-    if (!m || !r || remote_fraction(r, drive->output, &unused) ||
-        (drive->enable && remote_get(r, drive->enable, &unused)))
+    const struct remote *const r = sim_sserial_remote(card, drive->port, drive->channel);
+    if (!m || !r || remote_speed(r, drive->output, &unused))
         return HM2_ERR_NOTFOUND;
     if (!(drive->time_constant_s >= 0) || drive->time_constant_s > 1000)
         return HM2_ERR_RANGE;

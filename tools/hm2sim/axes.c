@@ -4,6 +4,8 @@
 #include <inttypes.h>
 #include <stdio.h>
 
+#include "sserial.h"
+
 static int connect_encoders(const struct axes *const a, struct hm2_diag *const diag)
 {
     const struct card_options *const o = a->options;
@@ -21,10 +23,21 @@ static int connect_encoders(const struct axes *const a, struct hm2_diag *const d
             return hm2_diag_add(diag, err, "--motor %u:%u: this card has no such encoder or PWM generator", m->encoder,
                                 m->pwmgen);
     }
+    for (unsigned i = 0; i < o->servo_count; i++) {
+        const struct servo *const s = &o->servos[i];
+        const struct sim_drive drive = {s->port, s->channel, s->output, s->counts_per_s, s->time_constant_s};
+        const int err = sim_card_drive_motor(a->card, s->encoder, &drive);
+        if (err)
+            return hm2_diag_add(diag, err,
+                                "--servo %u:%u:%u:%s: this card has no such encoder, or no remote with such "
+                                "a numeric output there",
+                                s->encoder, s->port, s->channel, s->output);
+    }
     for (unsigned i = 0; i < o->index_count; i++) {
         const int err = sim_card_index(a->card, o->indices[i].encoder, o->indices[i].counts);
         if (err)
-            return hm2_diag_add(diag, err, "--index %u: this card has no such encoder with --follow or --motor",
+            return hm2_diag_add(diag, err,
+                                "--index %u: this card has no such encoder with --follow, --motor or --servo",
                                 o->indices[i].encoder);
     }
     return 0;
@@ -82,7 +95,7 @@ void axes_run(struct axes *const axes)
 
 void axes_print(const struct axes *const axes, const char *const name)
 {
-    const unsigned encoders = axes->options->follower_count + axes->options->motor_count;
+    const unsigned encoders = axes->options->follower_count + axes->options->motor_count + axes->options->servo_count;
     int64_t position;
     for (unsigned unit = 0; encoders > 0 && sim_card_turned(axes->card, HM2_GTAG_ENCODER, unit, &position) == 0; unit++)
         printf("%s: encoder %u at %" PRId64 "\n", name, unit, position);

@@ -22,6 +22,8 @@
 #define DEFAULT_PRIORITY      50
 #define ADDRESS_CHARACTERS    32
 #define MAX_PATTERN_PERIOD_MS 1e6
+#define MAX_TIME_CONSTANT_MS  1e5
+#define MS_PER_S              1e3
 
 /* ---- numbers ------------------------------------------------------------------------------------------------------
  */
@@ -364,6 +366,38 @@ static int add_remote(struct reading *const r, const char *const value)
     return 0;
 }
 
+/* ENCODER:PORT:CHANNEL:OUTPUT:COUNTS[:MS] */
+static int add_servo(struct reading *const r, const char *const value)
+{
+    static const char wanted[] =
+        "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS[:MILLISECONDS], such as 0:0:1:AnalogOut0:100000:20";
+    struct servo s = {.time_constant_s = 0};
+    unsigned long encoder, port, channel;
+    long counts;
+    double ms = 0;
+    const char *at;
+    if (!read_unsigned(value, UINT8_MAX, &at, &encoder) || *at != ':' ||
+        !read_unsigned(at + 1, UINT8_MAX, &at, &port) || *at != ':' ||
+        !read_unsigned(at + 1, UINT8_MAX, &at, &channel) || *at != ':')
+        return refuse(r, "--servo", value, wanted);
+    const size_t len = strcspn(++at, ":");
+    if (len == 0 || len >= sizeof s.output || at[len] != ':')
+        return refuse(r, "--servo", value, wanted);
+    memcpy(s.output, at, len);
+    if (!read_signed(at + len + 1, INT32_MAX, &at, &counts) || (*at != ':' && *at != '\0') ||
+        (*at == ':' && !whole_real(at + 1, 0, MAX_TIME_CONSTANT_MS, &ms)))
+        return refuse(r, "--servo", value, wanted);
+    if (r->card->servo_count == MAX_WIRES)
+        return refuse(r, "--servo", value, "at most 32 servos a card");
+    s.encoder = (unsigned)encoder;
+    s.port = (unsigned)port;
+    s.channel = (unsigned)channel;
+    s.counts_per_s = (int32_t)counts;
+    s.time_constant_s = ms / MS_PER_S;
+    r->card->servos[r->card->servo_count++] = s;
+    return 0;
+}
+
 /* ---- faults -------------------------------------------------------------------------------------------------------
  */
 
@@ -429,6 +463,7 @@ enum {
     OPT_SWITCH,
     OPT_DRIVE,
     OPT_REMOTE,
+    OPT_SERVO,
     OPT_MAC,
     OPT_LATENCY,
     OPT_REALTIME,
@@ -455,6 +490,7 @@ static const struct option long_options[] = {
     {"switch", required_argument, NULL, OPT_SWITCH},
     {"drive", required_argument, NULL, OPT_DRIVE},
     {"remote", required_argument, NULL, OPT_REMOTE},
+    {"servo", required_argument, NULL, OPT_SERVO},
     {"mac", required_argument, NULL, OPT_MAC},
     {"latency", no_argument, NULL, OPT_LATENCY},
     {"realtime", optional_argument, NULL, OPT_REALTIME},
@@ -505,7 +541,13 @@ static void print_help(void)
           stdout);
     for (const char *const *card = sim_sserial_cards(); *card; card++)
         printf(" %s", *card);
-    fputs("\nRemotes:", stdout);
+    fputs(
+        "\n"
+        "  --servo ENC:PORT:CHANNEL:OUTPUT:COUNTS[:MS]  a motor at a remote's analog output, COUNTS a second at full\n"
+        "                      output, with a time constant\n"
+        "\n"
+        "Remotes for --serial:",
+        stdout);
     for (const char *const *remote = remote_names(); *remote; remote++)
         printf(" %s", *remote);
     fputs("\n\n"
@@ -562,6 +604,8 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_switch(r, value);
     case OPT_REMOTE:
         return add_remote(r, value);
+    case OPT_SERVO:
+        return add_servo(r, value);
     default:
         return add_pattern(r, value);
     }

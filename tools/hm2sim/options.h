@@ -14,6 +14,7 @@
 #define MAX_PATTERNS 32u
 #define MAX_SERIALS  8u
 #define MAX_REMOTES  32u
+#define FIELD_SIZE   24u /* of a remote's field name */
 #define PATTERN_BITS 64u
 
 struct wire {
@@ -35,6 +36,14 @@ struct motor {
 struct remote_option {
     unsigned port, channel;
     const char *card; /* one of sim_sserial_cards() or remote_names() */
+};
+
+/* A drive and motor at an analog output of such a card, with an encoder on its shaft. */
+struct servo {
+    unsigned encoder, port, channel;
+    char output[FIELD_SIZE];
+    int32_t counts_per_s;
+    double time_constant_s;
 };
 
 struct encoder_index {
@@ -65,7 +74,8 @@ struct card_options {
     uint16_t port;
     const char *firmware; /* file */
     uint8_t mac[6];
-    unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count, remote_count;
+    unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count, remote_count,
+        servo_count;
     struct wire wires[MAX_WIRES];
     struct follower followers[MAX_WIRES];
     struct motor motors[MAX_WIRES];
@@ -73,6 +83,7 @@ struct card_options {
     struct position_switch switches[MAX_WIRES];
     struct pattern patterns[MAX_PATTERNS];
     struct remote_option remotes[MAX_REMOTES];
+    struct servo servos[MAX_WIRES];
 };
 
 /* A remote of one processor on a pseudo-terminal. */
