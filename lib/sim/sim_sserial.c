@@ -151,8 +151,8 @@ static void boot_event(struct sim_module *const m, struct sserial_port *const p,
 /* ---- carrying out -------------------------------------------------------------------------------------------------
  */
 
-/* A command is accepted at edge clk: how long it takes, and what the data register says then. */
-static int64_t accept(struct sim_module *const m, struct sserial_port *const p, const int64_t clk)
+/* A command is accepted: how long it takes, and what the data register says then. */
+static int64_t accept(struct sim_module *const m, struct sserial_port *const p)
 {
     const uint32_t command = p->running;
     const unsigned mask = command & 0xFFu;
@@ -167,11 +167,11 @@ static int64_t accept(struct sim_module *const m, struct sserial_port *const p, 
         return mask ? STOP_CLK : STOP_ALL_CLK;
     case COMMAND_START:
     case COMMAND_SETUP:
-        return sserial_start(m, p, command, clk);
+        return sserial_start(m, p, command);
     case COMMAND_DO_IT:
         if (first)
             p->result = (uint8_t)mask;
-        return first ? OTHER_CLK : sserial_do_it(m, p, mask, clk);
+        return first ? OTHER_CLK : sserial_do_it(m, p, mask);
     default:
         return OTHER_CLK;
     }
@@ -193,7 +193,7 @@ static void begin(struct sim_module *const m, struct sserial_port *const p, cons
         return;
     }
     p->mode = SSERIAL_BUSY;
-    p->done = clk + accept(m, p, clk);
+    p->done = clk + accept(m, p);
 }
 
 static void do_local(struct sserial_port *const p)
@@ -254,6 +254,7 @@ static void advance_port(struct sim_module *const m, struct sserial_port *const 
         const int64_t done = counting(p) ? p->done : SIM_NEVER;
         const int64_t bite = sserial_next_bite(m, p);
         const int64_t next = first_of(first_of(done, p->aside), bite);
+        sserial_keep_alive(m, p, next < to ? next : to);
         if (next >= to)
             return;
         sserial_turn(m, next);
