@@ -309,24 +309,29 @@ static uint32_t read_reg(struct sim_module *const m, const unsigned page, const 
     return 0;
 }
 
+/* A command at the wrong time that is cleared nevertheless, without having been done. */
+static bool is_swallowed(const struct sserial_port *const p)
+{
+    const bool stops_channels = p->command >> 8 == COMMAND_STOP && p->command != STOP_ALL;
+    const bool doing_it = p->mode == SSERIAL_BUSY && p->running >> 8 == COMMAND_DO_IT;
+    if (p->mode == SSERIAL_SWALLOW)
+        return p->command != STOP_ALL;
+    return stops_channels && (p->mode == SSERIAL_DEAF || doing_it);
+}
+
 static void write_command(struct sim_module *const m, struct sserial_port *const p, const uint32_t value)
 {
     if (value & COMMAND_IGNORE)
         return;
     p->command = value & COMMAND_BITS;
-    const bool stops_channels = p->command >> 8 == COMMAND_STOP && p->command != STOP_ALL;
-    if (p->command & COMMAND_RESET) {
+    if (p->command & COMMAND_RESET)
         p->mode = SSERIAL_HELD;
-    } else if (p->mode == SSERIAL_HELD) {
+    else if (p->mode == SSERIAL_HELD)
         boot(m, p, m->clk);
-    } else if (p->mode == SSERIAL_IDLE && p->command) {
+    else if (p->mode == SSERIAL_IDLE && p->command)
         begin(m, p, m->clk);
-    } else if (p->mode == SSERIAL_SWALLOW && p->command != STOP_ALL) {
+    else if (is_swallowed(p))
         p->aside = m->clk + OTHER_CLK;
-    } else if (stops_channels &&
-               (p->mode == SSERIAL_DEAF || (p->mode == SSERIAL_BUSY && p->running >> 8 == COMMAND_DO_IT))) {
-        p->aside = m->clk + OTHER_CLK;
-    }
 }
 
 static void write_reg(struct sim_module *const m, const unsigned page, const unsigned low, const uint32_t value)

@@ -367,7 +367,7 @@ static void exchange(const struct sserial_channel *const c, const unsigned users
                      uint8_t *const in)
 {
     uint8_t out[REMOTE_MAX_BYTES] = {0};
-    for (unsigned i = 0; i < users * 4 && i < sizeof out; i++)
+    for (unsigned i = 0; i < users * 4; i++)
         out[i] = (uint8_t)(c->user_out[i / 4] >> 8 * (i % 4));
     remote_exchange(c->remote, now_ns, out, in);
 }
