@@ -329,20 +329,38 @@ static unsigned cards_of_same_name(const struct card *const card)
     return count;
 }
 
+#define CONFIG_SIZE 2048
+
+/* The card's configuration, and what hostmot2 takes as module parameters and the library as words of it. */
+static int complete_config(char text[const CONFIG_SIZE], const char *const configuration, struct hm2_diag *const diag)
+{
+    char baudrate[48] = "";
+    if (sserial_baudrate > 0)
+        rtapi_snprintf(baudrate, sizeof baudrate, " sserial_baudrate=%d", sserial_baudrate);
+    const int len = rtapi_snprintf(text, CONFIG_SIZE, "%s%s%s", configuration ? configuration : "", baudrate,
+                                   use_serial_numbers ? " use_serial_numbers" : "");
+    return len < CONFIG_SIZE ? HM2_OK
+                             : hm2_diag_add(diag, HM2_ERR_NOSPACE, "config: %d characters found, at most %d expected",
+                                            len, CONFIG_SIZE - 1);
+}
+
 static int bring_up(struct card *const card, const char *const address, const char *const configuration,
                     struct hm2_diag *const diag)
 {
     const struct link_udp_options options = {
         .address = address, .busy_poll_us = busy_poll > 0 ? (unsigned)busy_poll : 0, .watch_strangers = true};
+    char config_text[CONFIG_SIZE];
     struct link *link;
-    int err = link_udp_open(&link, &options, diag);
+    int err = complete_config(config_text, configuration, diag);
+    if (err == HM2_OK)
+        err = link_udp_open(&link, &options, diag);
     if (err == HM2_OK)
         err = hm2_board_identify(card->board, link, diag);
     if (err == HM2_OK && flight_folder && flight_folder[0])
         err = hm2_board_record(card->board, flight_cycles < 0 ? 0 : (unsigned)flight_cycles,
                                (int64_t)flight_slow_us * NS_PER_US, diag);
     if (err == HM2_OK)
-        err = hm2_board_setup(card->board, cards_of_same_name(card), &hal.binder, configuration, diag);
+        err = hm2_board_setup(card->board, cards_of_same_name(card), &hal.binder, config_text, diag);
     if (err == HM2_OK)
         err = hm2_board_start(card->board, diag);
     return err;
@@ -424,14 +442,6 @@ static void tell_no_effect(const char *const parameter, const char *const value,
     rtapi_print("hm2_lbp16: warning: %s=%s has no effect: %s\n", parameter, value, why);
 }
 
-static void tell_no_remotes(const char *const parameter, const int value, const int silent)
-{
-    char text[16];
-    rtapi_snprintf(text, sizeof text, "%d", value);
-    if (value != silent)
-        tell_no_effect(parameter, text, "no smart-serial remotes are driven");
-}
-
 /* Parameters of LinuxCNC's drivers that ask for what this component does not do. */
 static void tell_what_has_no_effect(void)
 {
@@ -439,8 +449,6 @@ static void tell_what_has_no_effect(void)
     for (unsigned i = 0; i < MAX_CARDS; i++)
         if (board_rtnet[i] && !is_one_of(board_rtnet[i], ordinary))
             tell_no_effect("board_rtnet", board_rtnet[i], "the sockets are those of the kernel (posix)");
-    tell_no_remotes("use_serial_numbers", use_serial_numbers, 0);
-    tell_no_remotes("sserial_baudrate", sserial_baudrate, -1);
 }
 
 static const struct {

@@ -10,10 +10,9 @@
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <termios.h>
-#include <time.h>
 #include <unistd.h>
 
-#define NS_PER_S INT64_C(1000000000)
+#include "clock.h"
 
 struct tty {
     struct link base;
@@ -31,10 +30,8 @@ static const struct {
 
 static int64_t tty_now(struct link *const link)
 {
-    struct timespec now;
     (void)link;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now); /* cannot fail for this clock */
-    return (int64_t)now.tv_sec * NS_PER_S + now.tv_nsec;
+    return clock_now_ns();
 }
 
 /* In one write, so that no gap comes between the bytes. The commands of a request and reply protocol always fit into
@@ -59,7 +56,7 @@ static bool wait_until(struct tty *const tty, const int64_t deadline_ns)
     const int64_t left_ns = deadline_ns > 0 ? deadline_ns - tty_now(&tty->base) : 0;
     if (left_ns <= 0)
         return false;
-    const struct timespec timeout = {.tv_sec = (time_t)(left_ns / NS_PER_S), .tv_nsec = (long)(left_ns % NS_PER_S)};
+    const struct timespec timeout = clock_span(left_ns);
     return ppoll(&ready, 1, &timeout, NULL) > 0;
 }
 

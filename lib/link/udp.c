@@ -12,14 +12,13 @@
 #include <string.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <hm2/lbp16.h>
 
+#include "clock.h"
 #include "text.h"
 
-#define NS_PER_S  INT64_C(1000000000)
 #define NS_PER_MS INT64_C(1000000)
 
 struct udp {
@@ -33,10 +32,8 @@ struct udp {
 
 static int64_t udp_now(struct link *const link)
 {
-    struct timespec now;
     (void)link;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now); /* cannot fail for this clock */
-    return (int64_t)now.tv_sec * NS_PER_S + now.tv_nsec;
+    return clock_now_ns();
 }
 
 /* Errors that say that some datagram met nobody, reported by ICMP or by the route: the datagram is lost, as others
@@ -62,11 +59,6 @@ static int udp_send(struct link *const link, const void *const data, const size_
     return errno == EMSGSIZE ? HM2_ERR_NOSPACE : HM2_ERR_IO;
 }
 
-static struct timespec span(const int64_t ns)
-{
-    return (struct timespec){.tv_sec = (time_t)(ns / NS_PER_S), .tv_nsec = (long)(ns % NS_PER_S)};
-}
-
 /* Wait until something can be received. False when the deadline is over; then nothing was waited for. */
 static bool wait_until(struct udp *const udp, const int64_t deadline_ns)
 {
@@ -75,7 +67,7 @@ static bool wait_until(struct udp *const udp, const int64_t deadline_ns)
         const int64_t now_ns = udp_now(&udp->base);
         if (deadline_ns <= now_ns)
             return false;
-        const struct timespec timeout = span(deadline_ns - now_ns);
+        const struct timespec timeout = clock_span(deadline_ns - now_ns);
         const int result = ppoll(&ready, 1, &timeout, NULL);
         if (result > 0)
             return true;
@@ -138,7 +130,7 @@ static int udp_recv(struct link *const link, void *const data, const size_t cap,
     if (clock_ns == LINK_CLOCK_UNREAD || deadline_ns <= clock_ns || udp->busy_ns > 0)
         return receive(udp, data, cap, deadline_ns);
     struct pollfd ready = {.fd = udp->fd, .events = POLLIN};
-    const struct timespec timeout = span(deadline_ns - clock_ns);
+    const struct timespec timeout = clock_span(deadline_ns - clock_ns);
     int result = 0;
     if (ppoll(&ready, 1, &timeout, NULL) > 0) {
         const enum got got = take(udp, data, cap, &result);

@@ -9,8 +9,6 @@
 #include "levels.h"
 
 #define SSERIAL_PORTS 8u
-#define SSERIAL_CS    2u /* register numbers (register map 3.8.1) */
-#define SSERIAL_USER  3u
 
 struct sserial_bit_out {
     hm2_bit_t *bit, *invert;

@@ -56,14 +56,15 @@ static void tell_channel(const struct hm2_module *const module, const struct sse
         hm2_notice_point(module, HM2_NOTICE_REMOTE_FAULT, channel_names[number], port->number, faults);
 }
 
-static void show_remotes(const struct hm2_module *const module, const struct sserial_port *const port)
+/* fresh: channels whose inputs this very reply brought. */
+static void show_remotes(const struct hm2_module *const module, const struct sserial_port *const port,
+                         const unsigned fresh)
 {
     bool fault = sslbp_engine_state(&port->engine) == SSLBP_ERROR;
     for (const struct sserial_remote *remote = port->remotes, *const end = remote + port->remote_count; remote < end;
          remote++) {
         const struct sslbp_channel *const channel = &port->engine.channel[remote->channel];
-        const bool running = port->engine.step == SSLBP_STEP_RUN;
-        *remote->fault = channel->failing || channel->lost || !running;
+        *remote->fault = channel->failing || !(fresh >> remote->channel & 1u);
         *remote->errors = channel->errors;
         *remote->status = channel->cs;
         fault |= channel->lost;
@@ -92,12 +93,13 @@ static void unpack_port(const struct hm2_module *const module, struct sserial_po
     const struct sslbp_wish wish = wish_of(port, cycle);
     const bool started = port->engine.step == SSLBP_STEP_START;
     port->write_lost = false;
-    take_inputs(port, sslbp_engine_take(&port->engine, &reply, &wish));
+    const unsigned fresh = sslbp_engine_take(&port->engine, &reply, &wish);
+    take_inputs(port, fresh);
     for (unsigned i = 0; started && i < port->remote_count; i++)
         sserial_start_counters(&port->remotes[i]);
     if (port->engine.step == SSLBP_STEP_RUN && !port->engine.clear)
         hm2_notice(module, HM2_NOTICE_PORT_LATE, port->number, (double)(cycle->now_ns - port->engine.sent_ns) * 1e-3);
-    show_remotes(module, port);
+    show_remotes(module, port, fresh);
 }
 
 void sserial_unpack_all(struct hm2_module *const module, const struct hm2_cycle *const cycle)

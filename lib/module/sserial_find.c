@@ -119,19 +119,6 @@ static int discover(const struct hm2_setup *const setup, const struct sslbp_port
     return err;
 }
 
-static void describe_port(const struct hm2_module *const module, struct hm2_setup *const setup, const unsigned port,
-                          struct sslbp_port *const access)
-{
-    access->diag = setup->diag;
-    /* Command and data exist per instance although the descriptor's mask says nothing of them (register map 3.8.1). */
-    access->command = (uint16_t)(module->md->base + port * module->md->instance_stride);
-    access->data = (uint16_t)(access->command + module->md->register_stride);
-    access->cs = hm2_md_address(module->md, SSERIAL_CS, port);
-    access->users = module->md->registers - SSERIAL_USER;
-    for (unsigned i = 0; i < access->users; i++)
-        access->user[i] = hm2_md_address(module->md, SSERIAL_USER + i, port);
-}
-
 /* A port that does not speak SSLBP is left alone, and its pins are GPIO. */
 static int open_port(const struct hm2_setup *const setup, const unsigned port, struct sslbp_port *const access)
 {
@@ -150,7 +137,8 @@ int sserial_find(const struct hm2_module *const module, struct hm2_setup *const 
 {
     uint8_t modes[SSLBP_CHANNELS];
     unsigned failed = 0, absent = 0;
-    describe_port(module, setup, port, access);
+    access->diag = setup->diag;
+    sslbp_port_place(access, module->md, port);
     for (unsigned channel = 0; channel < SSLBP_CHANNELS; channel++)
         modes[channel] = (uint8_t)sserial_mode(setup, port, channel);
     int err = open_port(setup, port, access);

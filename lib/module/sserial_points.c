@@ -39,7 +39,8 @@ static const struct hm2_point port_points[] = {
 #define REMOTE(field, name, type, help) HM2_POINT(struct sserial_remote, field, name, type, HM2_PIN_OUT, 0, "", help)
 
 static const struct hm2_point remote_points[] = {
-    REMOTE(fault, "link-fault", HM2_BIT, "1: the last transfer failed, or the remote is stopped; inputs are old"),
+    REMOTE(fault, "link-fault", HM2_BIT,
+           "1: the last reply of the card brought no new inputs of the remote, or it is stopped"),
     REMOTE(errors, "link-errors", HM2_U32, "failed transfers since load"),
     REMOTE(status, "link-status", HM2_U32, "CS register as read last (SSLBP manual)"),
 };

@@ -290,9 +290,9 @@ static const struct {
     {"firewall=nft", NULL},
     {"firewall=iptables", NULL},
     {"use_serial_numbers=0", NULL},
-    {"use_serial_numbers=1", "warning: use_serial_numbers=1 has no effect: "},
+    {"use_serial_numbers=1", NULL},
     {"sserial_baudrate=-1", NULL},
-    {"sserial_baudrate=115200", "warning: sserial_baudrate=115200 has no effect: "},
+    {"sserial_baudrate=115200", NULL},
 };
 #define PARAMETERS (sizeof parameters / sizeof parameters[0])
 

@@ -8,6 +8,7 @@
 #include <hm2/sim.h>
 #include <hm2/sslbp.h>
 
+#include "random.h"
 #include "remote_kind.h"
 #include "sserial.h"
 
@@ -447,6 +448,126 @@ static void after_a_bite_of_the_watchdog_the_port_starts_again(void **state)
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 1);
 }
 
+/* ---- a long run ---------------------------------------------------------------------------------------------------
+ */
+
+/* HM2_LONG_CYCLES=1000000 in the environment makes it long; so many take some seconds. */
+#define SHORT_CYCLES 50000u
+#define INPUTS       32u
+#define OUTPUTS      16u
+
+/* Inputs and outputs carry the number of the cycle in which they were set. */
+struct long_run {
+    hm2_bit_t *in[INPUTS], *out[OUTPUTS];
+    hm2_bit_t *fault;
+    hm2_u32_t *data_age;
+    hm2_float_t *analog;
+    struct remote *field, *analog_part;
+    uint32_t shown, driven; /* last seen */
+    unsigned fresh, failed;
+};
+
+static void *value_of(const struct fixture *const f, const char *const name)
+{
+    const struct hm2_plain_object *const object = hm2_plain_find(f->plain, name);
+    if (!object)
+        fail_msg("no point %s", name);
+    return object->value;
+}
+
+static void find_points(const struct fixture *const f, struct long_run *const r)
+{
+    char name[64];
+    for (unsigned i = 0; i < INPUTS; i++) {
+        (void)snprintf(name, sizeof name, PREFIX "7i77.0.0.input-%02u", i);
+        r->in[i] = value_of(f, name);
+    }
+    for (unsigned i = 0; i < OUTPUTS; i++) {
+        (void)snprintf(name, sizeof name, PREFIX "7i77.0.0.output-%02u", i);
+        r->out[i] = value_of(f, name);
+    }
+    r->fault = value_of(f, PREFIX "7i77.0.0.link-fault");
+    r->data_age = value_of(f, PREFIX "data-age");
+    r->analog = value_of(f, PREFIX "7i77.0.1.analogout3");
+    r->field = remote(f, FIELD_IO);
+    r->analog_part = remote(f, ANALOG);
+}
+
+static uint32_t shown_input(const struct long_run *const r)
+{
+    uint32_t value = 0;
+    for (unsigned i = 0; i < INPUTS; i++)
+        value |= (uint32_t)*r->in[i] << i;
+    return value;
+}
+
+/* Errors of all kinds, seldom more than a few in a row. */
+static void disturb(const struct fixture *const f, struct random *const random)
+{
+    static const char *const errors[] = {"crc", "overrun", "timeout", "extra", "break"};
+    if (random_below(random, 20) == 0)
+        assert_int_equal(sim_sserial_error(f->card, 0, random_below(random, 2), errors[random_below(random, 5)],
+                                           1 + random_below(random, 3)),
+                         0);
+}
+
+static void check_input(struct long_run *const r, const uint32_t number)
+{
+    const uint32_t value = shown_input(r);
+    const bool old = *r->fault || *r->data_age > 0;
+    /* What the transfer of the cycle before has brought; otherwise what was there, and never something older. */
+    if (old ? value != r->shown : value != number - 1)
+        fail_msg("cycle %u: the pins show %u, before %u, link-fault %d", number, value, r->shown, *r->fault);
+    r->shown = value;
+    r->failed += old;
+    r->fresh += !old;
+}
+
+static void check_output(struct long_run *const r, const uint32_t number)
+{
+    double value, volts;
+    assert_int_equal(remote_get(r->field, "Output", &value), 0);
+    assert_int_equal(remote_get(r->analog_part, "AnalogOut3", &volts), 0);
+    const uint16_t behind = (uint16_t)((uint16_t)number - (uint16_t)value);
+    if (behind > 8 || (int16_t)(uint16_t)((uint16_t)value - (uint16_t)r->driven) < 0)
+        fail_msg("cycle %u: the remote drives %u, before %u", number, (unsigned)value, r->driven);
+    if (fabs(fabs(volts) - 5) > 0.003)
+        fail_msg("cycle %u: the remote gives %g V", number, volts);
+    r->driven = (uint32_t)value;
+}
+
+static void many_cycles_with_errors_on_both_lines_show_nothing_stale_and_drive_no_glitch(void **state)
+{
+    struct fixture *const f = *state;
+    struct random random = {1};
+    const char *const wanted = getenv("HM2_LONG_CYCLES");
+    const uint32_t count = wanted ? (uint32_t)strtoul(wanted, NULL, 10) : SHORT_CYCLES;
+    struct long_run r = {.shown = 0};
+    plug(f);
+    load(f, "sserial_port_0=00xxxxxx");
+    set(f, "packet-error-limit", 1000);
+    run(f);
+    assert_int_equal(sim_net_set_faults(f->net, &(struct sim_faults){.seed = 1, .loss = 0.002, .duplicate = 0.002}), 0);
+    find_points(f, &r);
+    for (uint32_t number = 0; number < count; number++) {
+        const int64_t begin_ns = link_now_ns(f->link);
+        hm2_board_read(f->board, PERIOD_NS);
+        if (number > 8) {
+            check_input(&r, number);
+            check_output(&r, number);
+        }
+        for (unsigned i = 0; i < OUTPUTS; i++)
+            *r.out[i] = number >> i & 1u;
+        *r.analog = number & 1u ? 5 : -5;
+        assert_int_equal(remote_set(r.field, "Input", number), 0);
+        disturb(f, &random);
+        hm2_board_write(f->board, PERIOD_NS);
+        sim_net_sleep_until(f->net, begin_ns + PERIOD_NS);
+    }
+    assert_true(r.failed > count / 50 && r.fresh > count / 2);
+    assert_int_equal(get(f, "sserial.port-0.port_state"), SSLBP_RUNNING);
+}
+
 int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
@@ -466,6 +587,7 @@ int main(void)
         TEST(a_port_without_remotes_left_is_in_error_until_run_changes),
         TEST(a_restarted_card_starts_its_remotes_again),
         TEST(after_a_bite_of_the_watchdog_the_port_starts_again),
+        TEST(many_cycles_with_errors_on_both_lines_show_nothing_stale_and_drive_no_glitch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

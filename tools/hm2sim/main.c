@@ -16,6 +16,7 @@
 
 #include "control.h"
 #include "options.h"
+#include "serial.h"
 #include "station.h"
 
 #define NS_PER_S   1000000000
@@ -23,13 +24,15 @@
 
 enum { EXIT_FAILED = 1, EXIT_USAGE = 2 };
 
-/* What an epoll event is about: a station's number, or one of these. */
-enum { SOURCE_SIGNAL = MAX_CARDS, SOURCE_TIMER, SOURCE_CONTROL };
+/* What an epoll event is about: a station's number, one of these, or the last and the number of a serial line. */
+enum { SOURCE_SIGNAL = MAX_CARDS, SOURCE_TIMER, SOURCE_CONTROL, SOURCE_SERIAL };
 
 struct program {
     struct options options;
     unsigned count;
     struct station stations[MAX_CARDS];
+    unsigned serial_count;
+    struct serial serials[MAX_SERIALS];
     int epoll, signals, timer, control;
     struct timespec start;
     int64_t timer_ns; /* what the timer is set to */
@@ -81,6 +84,20 @@ static int open_stations(struct program *const p, struct hm2_diag *const diag)
     return 0;
 }
 
+static int open_serials(struct program *const p, struct hm2_diag *const diag)
+{
+    for (unsigned i = 0; i < p->options.serial_count; i++) {
+        p->serial_count = i + 1;
+        const uint32_t number = (uint32_t)p->options.seed + i;
+        const int err = serial_open(&p->serials[i], &p->options.serials[i], number, diag);
+        if (err)
+            return err;
+        if (watch(p, p->serials[i].fd, SOURCE_SERIAL + i))
+            return hm2_diag_add(diag, HM2_ERR_IO, "cannot watch a pseudo-terminal: %s", strerror(errno));
+    }
+    return 0;
+}
+
 static int open_control(struct program *const p, struct hm2_diag *const diag)
 {
     if (!p->options.control)
@@ -112,6 +129,8 @@ static void print_ready(const struct program *const p)
         station_name(&p->stations[i], name);
         printf(" %s", name);
     }
+    for (unsigned i = 0; i < p->serial_count; i++)
+        printf(" %s@%s", p->options.serials[i].remote, p->options.serials[i].path);
     putchar('\n');
     fflush(stdout);
 }
@@ -178,7 +197,10 @@ static void on_event(struct program *const p, const uint32_t source)
         p->end = control_receive(p->control, p->stations, p->count, now_ns(p)) || p->end;
         break;
     default:
-        station_receive(&p->stations[source], now_ns(p));
+        if (source < SOURCE_SIGNAL)
+            station_receive(&p->stations[source], now_ns(p));
+        else
+            serial_receive(&p->serials[source - SOURCE_SERIAL], now_ns(p));
         break;
     }
 }
@@ -205,6 +227,8 @@ static void close_all(struct program *const p)
 {
     for (unsigned i = 0; i < p->count; i++)
         station_close(&p->stations[i]);
+    for (unsigned i = 0; i < p->serial_count; i++)
+        serial_close(&p->serials[i]);
     if (p->control >= 0) {
         close(p->control);
         unlink(p->options.control);
@@ -233,6 +257,8 @@ int main(const int argc, char **const argv)
     int err = open_loop(&p, &diag);
     if (!err)
         err = open_stations(&p, &diag);
+    if (!err)
+        err = open_serials(&p, &diag);
     if (!err)
         err = open_control(&p, &diag);
     int status = EXIT_FAILED;

@@ -138,6 +138,31 @@ static int add_card(struct reading *const r, const char *const value)
     return 0;
 }
 
+static const char *find_name(const char *const *names, const char *const name)
+{
+    for (; *names; names++)
+        if (strcmp(*names, name) == 0)
+            return *names;
+    return NULL;
+}
+
+/* REMOTE@PATH */
+static int add_serial(struct reading *const r, const char *const value)
+{
+    struct options *const o = r->options;
+    char name[ADDRESS_CHARACTERS];
+    const size_t len = strcspn(value, "@");
+    if (o->serial_count == MAX_SERIALS)
+        return refuse(r, "--serial", value, "at most 8 remotes");
+    memcpy(name, value, len < sizeof name ? len : 0);
+    name[len < sizeof name ? len : 0] = '\0';
+    const char *const remote = find_name(remote_names(), name);
+    if (!remote || value[len] != '@' || value[len + 1] == '\0')
+        return refuse(r, "--serial", value, "REMOTE@PATH with a remote that hm2sim --help lists");
+    o->serials[o->serial_count++] = (struct serial_option){remote, value + len + 1};
+    return 0;
+}
+
 static bool read_mac(const char *text, uint8_t mac[const 6])
 {
     for (unsigned i = 0; i < 6; i++) {
@@ -321,14 +346,6 @@ static int add_pattern(struct reading *const r, const char *const value)
     return 0;
 }
 
-static const char *find_name(const char *const *names, const char *const name)
-{
-    for (; *names; names++)
-        if (strcmp(*names, name) == 0)
-            return *names;
-    return NULL;
-}
-
 /* PORT:CHANNEL=CARD */
 static int add_remote(struct reading *const r, const char *const value)
 {
@@ -458,6 +475,7 @@ enum {
     OPT_RUN,
     OPT_STATS,
     OPT_CONTROL,
+    OPT_SERIAL,
     OPT_QUIET,
     OPT_HELP,
     OPT_VERSION
@@ -489,6 +507,7 @@ static const struct option long_options[] = {
     {"run", required_argument, NULL, OPT_RUN},
     {"stats", optional_argument, NULL, OPT_STATS},
     {"control", required_argument, NULL, OPT_CONTROL},
+    {"serial", required_argument, NULL, OPT_SERIAL},
     {"quiet", no_argument, NULL, OPT_QUIET},
     {"help", no_argument, NULL, OPT_HELP},
     {"version", no_argument, NULL, OPT_VERSION},
@@ -515,6 +534,7 @@ static void print_help(void)
           "  --run SECONDS       end after this time\n"
           "  --stats[=SECONDS]   print statistics every second (or so), not only at the end\n"
           "  --control PATH      take commands on a Unix datagram socket\n"
+          "  --serial REMOTE@PATH  a smart-serial remote in set-up mode on a pseudo-terminal, PATH a link to it\n"
           "  --quiet             print the ready line only\n"
           "  --help, --version\n"
           "\n"
@@ -541,8 +561,13 @@ static void print_help(void)
         "  --servo ENC:PORT:CHANNEL:OUTPUT:COUNTS[:MS]  a motor at a remote's analog output, COUNTS a second at full\n"
         "                      output, with a time constant\n"
         "\n"
-        "When all cards listen, one line \"ready CARD@ADDRESS:PORT ...\" is printed. SIGINT and SIGTERM end it.\n",
+        "Remotes for --serial:",
         stdout);
+    for (const char *const *remote = remote_names(); *remote; remote++)
+        printf(" %s", *remote);
+    fputs("\n\n"
+          "When all cards listen, one line \"ready CARD@ADDRESS:PORT ...\" is printed. SIGINT and SIGTERM end it.\n",
+          stdout);
 }
 
 static int take_seconds(struct reading *const r, const char *const option, const char *const value,
@@ -639,6 +664,8 @@ static int take(struct reading *const r, const int option, const char *const val
         return set_port(r, value);
     case OPT_SEED:
         return take_seed(r, value);
+    case OPT_SERIAL:
+        return add_serial(r, value);
     case OPT_FAULTS:
         return options_faults(value, &o->faults, &r->diag);
     case OPT_LATENCY:
@@ -665,7 +692,7 @@ static int take(struct reading *const r, const int option, const char *const val
 static int settle_addresses(struct reading *const r)
 {
     struct options *const o = r->options;
-    if (o->card_count == 0 && add_card(r, "7i96s"))
+    if (o->card_count == 0 && o->serial_count == 0 && add_card(r, "7i96s"))
         return HM2_ERR_INVALID;
     for (unsigned i = 0; i < o->card_count; i++) {
         struct card_options *const card = &o->cards[i];

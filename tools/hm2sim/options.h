@@ -14,6 +14,7 @@
 #define MAX_CARDS    32u
 #define MAX_WIRES    32u
 #define MAX_PATTERNS 32u
+#define MAX_SERIALS  8u
 #define MAX_REMOTES  32u
 #define FIELD_SIZE   24u /* of a remote's field name */
 #define PATTERN_BITS 64u
@@ -88,9 +89,17 @@ struct card_options {
     struct servo servos[MAX_WIRES];
 };
 
+/* A remote of one processor on a pseudo-terminal. */
+struct serial_option {
+    const char *remote; /* one of remote_names() */
+    const char *path;   /* of a link to the terminal */
+};
+
 struct options {
     unsigned card_count;
     struct card_options cards[MAX_CARDS];
+    unsigned serial_count;
+    struct serial_option serials[MAX_SERIALS];
     uint64_t seed;
     struct sim_faults faults;
     bool latency, quiet, realtime;

@@ -75,6 +75,19 @@ HM2_API void hm2_board_read(struct hm2_board *board, int64_t period_ns);
 HM2_API void hm2_board_write(struct hm2_board *board, int64_t period_ns);
 HM2_API bool hm2_board_request_outstanding(const struct hm2_board *board);
 
+/* ---- service: an identified card that is not set up ----------------------------------------------------------- */
+
+struct sslbp_port;
+
+/* HM2_ERR_STATE when another program talks to the card; listens for 60 ms. */
+HM2_API int HM2_MUST_CHECK hm2_board_undriven(struct hm2_board *board, struct hm2_diag *diag);
+/* A smart-serial port (hm2/sslbp.h), stopped, with its pins driven and all others of the card inputs. access keeps
+ * pointers to board and diag. HM2_ERR_NOTFOUND, or what sslbp_port_open() says. */
+HM2_API int HM2_MUST_CHECK hm2_board_sserial_open(struct hm2_board *board, unsigned port, struct sslbp_port *access,
+                                                  struct hm2_diag *diag);
+/* Stop it; no pin is driven any more. */
+HM2_API void hm2_board_sserial_close(struct hm2_board *board, const struct sslbp_port *access);
+
 /* What happened, for people. Not realtime; may run in another thread than the cycle. Returns 1 with one sentence in
  * text and its severity in *error (true = an operator must know), 0 when there is nothing new. */
 HM2_API int hm2_board_next_message(struct hm2_board *board, char *text, size_t size, bool *error);

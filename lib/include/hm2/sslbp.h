@@ -94,6 +94,10 @@ struct sslbp_port {
     uint8_t major, minor, channels;
 };
 
+struct hm2_md;
+
+/* Addresses of an instance of the module (register map 3.8.1). */
+HM2_API void sslbp_port_place(struct sslbp_port *port, const struct hm2_md *md, unsigned instance);
 /* Reset the port, wait for its firmware and check that it is SSLBP. HM2_ERR_MISMATCH for anything else,
  * HM2_ERR_TIMEOUT when the firmware does not start; diag tells. */
 HM2_API int HM2_MUST_CHECK sslbp_port_open(struct sslbp_port *port);
