@@ -446,7 +446,7 @@ static uint64_t take_bits(const uint8_t *const data, const unsigned at, const un
 {
     uint64_t value = 0;
     for (unsigned i = 0; i < bits; i++)
-        value |= (uint64_t)(data[(at + i) / 8] >> (at + i) % 8 & 1u) << i;
+        value |= ((uint64_t)data[(at + i) / 8] >> (at + i) % 8 & 1u) << i;
     return value;
 }
 

@@ -151,8 +151,8 @@ static void boot_event(struct sim_module *const m, struct sserial_port *const p,
 /* ---- carrying out -------------------------------------------------------------------------------------------------
  */
 
-/* A command is accepted at edge clk: how long it takes, and what the data register says then. */
-static int64_t accept(struct sim_module *const m, struct sserial_port *const p, const int64_t clk)
+/* A command is accepted: how long it takes, and what the data register says then. */
+static int64_t accept(struct sim_module *const m, struct sserial_port *const p)
 {
     const uint32_t command = p->running;
     const unsigned mask = command & 0xFFu;
@@ -167,11 +167,11 @@ static int64_t accept(struct sim_module *const m, struct sserial_port *const p, 
         return mask ? STOP_CLK : STOP_ALL_CLK;
     case COMMAND_START:
     case COMMAND_SETUP:
-        return sserial_start(m, p, command, clk);
+        return sserial_start(m, p, command);
     case COMMAND_DO_IT:
         if (first)
             p->result = (uint8_t)mask;
-        return first ? OTHER_CLK : sserial_do_it(m, p, mask, clk);
+        return first ? OTHER_CLK : sserial_do_it(m, p, mask);
     default:
         return OTHER_CLK;
     }
@@ -193,7 +193,7 @@ static void begin(struct sim_module *const m, struct sserial_port *const p, cons
         return;
     }
     p->mode = SSERIAL_BUSY;
-    p->done = clk + accept(m, p, clk);
+    p->done = clk + accept(m, p);
 }
 
 static void do_local(struct sserial_port *const p)
@@ -254,6 +254,7 @@ static void advance_port(struct sim_module *const m, struct sserial_port *const 
         const int64_t done = counting(p) ? p->done : SIM_NEVER;
         const int64_t bite = sserial_next_bite(m, p);
         const int64_t next = first_of(first_of(done, p->aside), bite);
+        sserial_keep_alive(m, p, next < to ? next : to);
         if (next >= to)
             return;
         sserial_turn(m, next);
@@ -308,24 +309,29 @@ static uint32_t read_reg(struct sim_module *const m, const unsigned page, const 
     return 0;
 }
 
+/* A command at the wrong time that is cleared nevertheless, without having been done. */
+static bool is_swallowed(const struct sserial_port *const p)
+{
+    const bool stops_channels = p->command >> 8 == COMMAND_STOP && p->command != STOP_ALL;
+    const bool doing_it = p->mode == SSERIAL_BUSY && p->running >> 8 == COMMAND_DO_IT;
+    if (p->mode == SSERIAL_SWALLOW)
+        return p->command != STOP_ALL;
+    return stops_channels && (p->mode == SSERIAL_DEAF || doing_it);
+}
+
 static void write_command(struct sim_module *const m, struct sserial_port *const p, const uint32_t value)
 {
     if (value & COMMAND_IGNORE)
         return;
     p->command = value & COMMAND_BITS;
-    const bool stops_channels = p->command >> 8 == COMMAND_STOP && p->command != STOP_ALL;
-    if (p->command & COMMAND_RESET) {
+    if (p->command & COMMAND_RESET)
         p->mode = SSERIAL_HELD;
-    } else if (p->mode == SSERIAL_HELD) {
+    else if (p->mode == SSERIAL_HELD)
         boot(m, p, m->clk);
-    } else if (p->mode == SSERIAL_IDLE && p->command) {
+    else if (p->mode == SSERIAL_IDLE && p->command)
         begin(m, p, m->clk);
-    } else if (p->mode == SSERIAL_SWALLOW && p->command != STOP_ALL) {
+    else if (is_swallowed(p))
         p->aside = m->clk + OTHER_CLK;
-    } else if (stops_channels &&
-               (p->mode == SSERIAL_DEAF || (p->mode == SSERIAL_BUSY && p->running >> 8 == COMMAND_DO_IT))) {
-        p->aside = m->clk + OTHER_CLK;
-    }
 }
 
 static void write_reg(struct sim_module *const m, const unsigned page, const unsigned low, const uint32_t value)

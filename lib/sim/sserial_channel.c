@@ -201,12 +201,10 @@ static void start_channel(struct sim_module *const m, struct sserial_port *const
         c->link = in_setup(p->running) ? SSERIAL_SETUP : SSERIAL_READY;
 }
 
-int64_t sserial_start(struct sim_module *const m, struct sserial_port *const p, const uint32_t command,
-                      const int64_t clk)
+int64_t sserial_start(struct sim_module *const m, struct sserial_port *const p, const uint32_t command)
 {
     const bool setup = in_setup(command);
     int64_t longest = SHORT_CLK;
-    (void)clk;
     p->named = command & 0xFFu;
     p->result = (uint8_t)(p->named >> p->channel_count << p->channel_count); /* channels that the firmware lacks */
     for (unsigned i = 0; i < p->channel_count; i++) {
@@ -369,7 +367,7 @@ static void exchange(const struct sserial_channel *const c, const unsigned users
                      uint8_t *const in)
 {
     uint8_t out[REMOTE_MAX_BYTES] = {0};
-    for (unsigned i = 0; i < users * 4 && i < sizeof out; i++)
+    for (unsigned i = 0; i < users * 4; i++)
         out[i] = (uint8_t)(c->user_out[i / 4] >> 8 * (i % 4));
     remote_exchange(c->remote, now_ns, out, in);
 }
@@ -447,7 +445,7 @@ static bool takes_part(const struct sserial_channel *const c)
 
 /* Decided now, reported when the message has ended: c->pending. Ordered errors hit what comes back: the remote has done
  * what it was told. */
-static int64_t send(struct sim_module *const m, struct sserial_port *const p, const unsigned i, const int64_t clk)
+static int64_t send(struct sim_module *const m, struct sserial_port *const p, const unsigned i)
 {
     struct sserial_channel *const c = &p->channels[i];
     const uint8_t errors = (uint8_t)~SSERIAL_COOKIE;
@@ -458,21 +456,19 @@ static int64_t send(struct sim_module *const m, struct sserial_port *const p, co
     }
     c->reached = heard(m, p, i);
     c->pending = c->reached && answered(m, c) ? ordered_error(c, errors) : SSERIAL_TIMEOUT;
-    if (c->reached && c->link == SSERIAL_READY)
-        remote_feed(c->remote, sserial_ns(m, clk)); /* it was kept alive until now */
     if (c->pending & SSERIAL_TIMEOUT)
         return (int64_t)p->locals[sserial_local(i, SSERIAL_LOCAL_TIMEOUT)] * 200 - 10;
     return c->link == SSERIAL_SETUP ? lbp_clk(c->cs_out) : exchange_clk(c);
 }
 
-int64_t sserial_do_it(struct sim_module *const m, struct sserial_port *const p, const unsigned mask, const int64_t clk)
+int64_t sserial_do_it(struct sim_module *const m, struct sserial_port *const p, const unsigned mask)
 {
     int64_t longest = SHORT_CLK;
     p->result = (uint8_t)(p->named ? mask & ~p->named : 0);
     for (unsigned i = 0; i < p->channel_count; i++) {
         if (!(mask >> i & 1u) || !takes_part(&p->channels[i]))
             continue;
-        const int64_t takes = send(m, p, i, clk);
+        const int64_t takes = send(m, p, i);
         longest = takes > longest ? takes : longest;
     }
     return longest;
@@ -528,6 +524,13 @@ static int64_t clk_of(const struct sim_module *const m, const int64_t ns)
 static bool kept_alive(const struct sserial_channel *const c)
 {
     return c->link == SSERIAL_READY && c->cable != SIM_CABLE_OUT;
+}
+
+void sserial_keep_alive(const struct sim_module *const m, struct sserial_port *const p, const int64_t clk)
+{
+    for (unsigned i = 0; i < p->channel_count; i++)
+        if (kept_alive(&p->channels[i]))
+            remote_feed(p->channels[i].remote, sserial_ns(m, clk));
 }
 
 int64_t sserial_next_bite(const struct sim_module *const m, const struct sserial_port *const p)

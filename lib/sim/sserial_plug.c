@@ -92,13 +92,9 @@ static struct sserial_channel *plugged(struct sim_card *const card, const unsign
 int sim_sserial_cable(struct sim_card *const card, const unsigned port, const unsigned channel,
                       const enum sim_cable cable)
 {
-    struct sserial_channel *const c = plugged(card, port, channel);
+    struct sserial_channel *const c = plugged(card, port, channel); /* advanced: kept alive until now */
     if (!c)
         return HM2_ERR_NOTFOUND;
-    unsigned instance = port;
-    const struct sim_module *const m = sserial_module(card, &instance);
-    if (c->cable != SIM_CABLE_OUT && c->link == SSERIAL_READY)
-        remote_feed(c->remote, sserial_ns(m, m->clk)); /* it was kept alive until now */
     c->cable = cable;
     return 0;
 }

@@ -125,8 +125,8 @@ void sserial_turn(struct sim_module *m, int64_t clk);
 
 /* sserial_channel.c. Mask: channels that a command is for. Each returns the clocks that it takes. */
 void sserial_channels_reset(struct sserial_port *p);
-int64_t sserial_start(struct sim_module *m, struct sserial_port *p, uint32_t command, int64_t clk);
-int64_t sserial_do_it(struct sim_module *m, struct sserial_port *p, unsigned mask, int64_t clk);
+int64_t sserial_start(struct sim_module *m, struct sserial_port *p, uint32_t command);
+int64_t sserial_do_it(struct sim_module *m, struct sserial_port *p, unsigned mask);
 /* START and DOIT end: registers get what the remotes said. */
 void sserial_start_done(struct sim_module *m, struct sserial_port *p, int64_t clk);
 void sserial_do_it_done(struct sim_module *m, struct sserial_port *p, int64_t clk);
@@ -135,6 +135,8 @@ void sserial_stop_all(struct sserial_port *p);
 void sserial_freshen(struct sserial_port *p);
 /* CS register of a channel, with the state it passes through during a START. */
 uint32_t sserial_cs(const struct sserial_port *p, unsigned channel, int64_t clk);
+/* The firmware has talked to remotes that wait for a first DOIT until this edge. */
+void sserial_keep_alive(const struct sim_module *m, struct sserial_port *p, int64_t clk);
 /* Watchdogs of the remotes: the first that will bite, and all that have until clk. */
 int64_t sserial_next_bite(const struct sim_module *m, const struct sserial_port *p);
 void sserial_bite(struct sim_module *m, struct sserial_port *p, int64_t clk);

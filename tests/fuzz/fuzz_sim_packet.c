@@ -31,8 +31,8 @@ static void answers(struct sim_card *const card, const int64_t now_ns)
 
 int LLVMFuzzerTestOneInput(const uint8_t *const data, const size_t size)
 {
-    static const char *const profiles[] = {"7i96s", "7i93"};
-    const struct sim_card_options options = {.profile = profiles[size > 0 && (data[0] & 1)]};
+    static const char *const profiles[] = {"7i96s", "7i93", "7i96s_7i77d", "7i93"};
+    const struct sim_card_options options = {.profile = profiles[size > 0 ? data[0] & 3 : 0]};
     struct sim_card *card = NULL;
     uint8_t reply[2048];
     int64_t now_ns = 0;

@@ -222,6 +222,11 @@ static const char *const bad_options[][3] = {
     {"--mac", "00:11:22", "six bytes"},
     {"--run", "0", "seconds"},
     {"--realtime=100", NULL, "priority"},
+    {"--remote", "0=7i77", "PORT:CHANNEL=CARD"},
+    {"--remote", "0:0=7i99", "PORT:CHANNEL=CARD"},
+    {"--servo", "0:0:1:AnalogOut0", "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS"},
+    {"--servo", "0:0:1::100", "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS"},
+    {"--servo", "0:0:1:AnalogOut0:100:-1", "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS"},
     {"--nonsense", NULL, "--nonsense"},
     {"stray", NULL, "not an option"},
 };
@@ -247,6 +252,9 @@ START_TEST(what_the_card_does_not_have_is_refused)
         {"--switch", "60:stepgen.0:1:01", "I/O 0 to 50"},
         {"--switch", "1:stepgen.9:1:01", "no step generator 9"},
         {"--switch", "1:encoder.9:1:01", "no encoder 9"},
+        {"--remote", "0:0=7i77", "no smart-serial port 0 channel 1"},
+        {"--remote", "1:0=7i76", "no smart-serial port 1 channel 0"},
+        {"--servo", "0:0:0:SpinOut:100", "no remote with such a numeric output"},
         {"--firmware", "/nonexistent.hex", "/nonexistent.hex"},
         {"--bind", "192.0.2.1", "cannot listen"},
         {"--control", "/nonexistent/socket", "control socket"},
@@ -396,6 +404,38 @@ START_TEST(pads_are_driven_by_option_and_command)
     command("pad 42", "0");
     command("drive 42 x", "error: ");
     command("drive 51 1", "error: ");
+    stop_sim();
+}
+END_TEST
+
+START_TEST(remotes_are_told_and_asked_by_command)
+{
+    static const struct {
+        const char *command, *answer;
+    } talk[] = {
+        {"remote 0:0 get FieldVoltage", "24.0576"},
+        {"remote 0:0 set input 0x80000001", "ok"},
+        {"remote 0:0 get Input", "2147483649"},
+        {"remote 0:0 get Output", "0"},
+        {"remote 0:0 terminal 3", "z"},
+        {"remote 0:0 error crc 2", "ok"},
+        {"remote 0:0 short 0x8", "ok"},
+        {"remote 0:0 fault 4", "ok"},
+        {"remote 0:0 pull", "ok"},
+        {"remote 0:0 plug", "ok"},
+        {"remote 0:0 power-cycle", "ok"},
+        {"remote 0:0 set Input 1 2", "error: remote PORT:CHANNEL set"},
+        {"remote 0:0 set Input -1", "error: set"},
+        {"remote 0:0 get Outputs", "error: get"},
+        {"remote 0:0 error boredom 1", "error: error"},
+        {"remote 0:1 pull", "error: remote PORT:CHANNEL of a remote that is there"},
+        {"remote 0 pull", "error: remote PORT:CHANNEL of a remote that is there"},
+        {"remote", "error: remote PORT:CHANNEL of a remote that is there"},
+    };
+    name_control();
+    start_sim((const char *const[]){"--control", control_path, "--remote", "0:0=7i76", NULL});
+    for (size_t i = 0; i < sizeof talk / sizeof talk[0]; i++)
+        command(talk[i].command, talk[i].answer);
     stop_sim();
 }
 END_TEST
@@ -592,6 +632,7 @@ int main(void)
     tcase_add_test(tests, a_stranger_sends_from_another_port);
     tcase_add_test(tests, a_packet_that_waits_is_answered_after_its_wait);
     tcase_add_test(tests, pads_are_driven_by_option_and_command);
+    tcase_add_test(tests, remotes_are_told_and_asked_by_command);
     tcase_add_test(tests, wires_and_followers_close_the_loop);
     tcase_add_test(tests, an_axis_presses_its_switches);
     tcase_add_test(tests, eight_cards_at_1_khz_take_at_most_half_a_core);

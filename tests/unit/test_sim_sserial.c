@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "profiles.h"
 #include "sim_card.h"
 #include "sserial.h"
 
@@ -260,6 +261,18 @@ static void a_remote_lives_on_zeros_until_the_first_doit_and_bites_50_ms_after_t
     assert_true(output(rig, FIELD, "Output") == 0xF);
 }
 
+static void a_stop_ends_what_keeps_a_waiting_remote_alive(void **state)
+{
+    const struct rig *const rig = *state;
+    assert_int_equal(command(rig, 0x0901), 0);
+    wait(rig, 500 * MS);
+    assert_int_equal(command(rig, 0x0800), 0xAA);
+    wait(rig, 49 * MS);
+    assert_int_equal(remote_faults(sim_sserial_remote(rig->card, 0, FIELD)), 0);
+    wait(rig, 2 * MS);
+    assert_int_equal(remote_faults(sim_sserial_remote(rig->card, 0, FIELD)), REMOTE_FAULT_WATCHDOG);
+}
+
 static void a_pulled_cable_times_out_its_channel_alone(void **state)
 {
     const struct rig *const rig = *state;
@@ -472,6 +485,39 @@ static void motors_need_an_encoder_and_an_output(void **state)
 /* ---- plugging -----------------------------------------------------------------------------------------------------
  */
 
+/* No listing of a card with SSerialB is known: the descriptors here are those of SSerial with another tag and registers
+ * (register map 3.8.1). */
+static void sserialb_has_seven_registers_a_channel_and_works_alike(void **state)
+{
+    (void)state;
+    struct hm2_image image;
+    sim_profile_image(sim_profile_find("7i96s"), &image);
+    for (unsigned i = 0; i < HM2_IDROM_WORDS; i++) {
+        if (image.rom[i] == 0x010100C1) {
+            image.rom[i] = 0x010100C6;
+            image.rom[i + 1] = 0x100A5B00;
+            image.rom[i + 2] = 0x3FC;
+        } else if ((image.rom[i] & 0xFFFFFF00) == 0x0300C100) {
+            image.rom[i] += 0x500;
+        }
+    }
+    struct rig rig;
+    const struct sim_card_options options = {.profile = "7i96s", .image = &image};
+    assert_int_equal(sim_card_new(&rig.card, &options, NULL), 0);
+    assert_int_equal(sim_sserial_plug(rig.card, 0, 0, "7i76", 7, NULL), 0);
+    put(&rig, DDR + 4, 1u << 14); /* TB2-18 */
+    put(&rig, ALTSRC + 4, 1u << 14);
+    wait(&rig, MS);
+    assert_int_equal(command(&rig, 0x0800), 0xAA);
+    assert_int_equal(command(&rig, 0x2003), 45);
+    assert_int_equal(command(&rig, 0x0901), 0);
+    assert_int_equal(user(&rig, 0, 0), 0x10000007);
+    uint32_t undriven = 1;
+    assert_int_equal(sim_card_read(rig.card, sim_card_clock(rig.card), USER0 + 0x600, &undriven), 0);
+    assert_int_equal(undriven, 0);
+    sim_card_free(rig.card);
+}
+
 static void what_cannot_be_plugged_is_refused_with_a_sentence(void **state)
 {
     const struct rig *const rig = *state;
@@ -499,6 +545,7 @@ int main(void)
         TEST(sourcing_and_sinking_outputs_differ_at_the_terminal_alone),
         TEST(ordered_errors_come_once_each_and_leave_inputs_as_they_were),
         TEST(a_remote_lives_on_zeros_until_the_first_doit_and_bites_50_ms_after_the_last),
+        TEST(a_stop_ends_what_keeps_a_waiting_remote_alive),
         TEST(a_pulled_cable_times_out_its_channel_alone),
         TEST(a_short_trips_when_the_output_comes_on),
         TEST(lost_field_power_is_a_fault_that_a_start_cannot_clear),
@@ -509,6 +556,7 @@ int main(void)
         TEST(a_motor_turns_by_the_output_with_inertia_while_it_is_enabled),
         TEST(a_motor_runs_out_when_the_remote_is_no_longer_fed),
         TEST(motors_need_an_encoder_and_an_output),
+        cmocka_unit_test(sserialb_has_seven_registers_a_channel_and_works_alike),
         TEST(what_cannot_be_plugged_is_refused_with_a_sentence),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -125,12 +125,28 @@ static const struct {
     {"fault", 1, do_fault},
 };
 
+/* "PORT:CHANNEL" */
+static bool find_remote(struct order *const o, const char *const where)
+{
+    char *end;
+    const unsigned long port = strtoul(where, &end, 10);
+    if (end == where || *end != ':')
+        return false;
+    const char *const behind = end + 1;
+    const unsigned long channel = strtoul(behind, &end, 10);
+    if (end == behind || *end != '\0' || port > UINT8_MAX || channel > UINT8_MAX)
+        return false;
+    o->port = (unsigned)port;
+    o->channel = (unsigned)channel;
+    o->remote = sim_sserial_remote(o->card, o->port, o->channel);
+    return o->remote != NULL;
+}
+
 void remotes_command(struct sim_card *const card, const char *const *const words, const unsigned count,
                      char *const reply, const size_t size)
 {
     struct order o = {.card = card, .arguments = words + 2, .reply = reply, .size = size};
-    if (count < 2 || sscanf(words[0], "%u:%u", &o.port, &o.channel) != 2 ||
-        !(o.remote = sim_sserial_remote(card, o.port, o.channel))) {
+    if (count < 2 || !find_remote(&o, words[0])) {
         snprintf(reply, size, "error: remote PORT:CHANNEL of a remote that is there");
         return;
     }
