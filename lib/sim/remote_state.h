@@ -43,6 +43,8 @@ void remote_put_tables(struct remote *remote);
 uint64_t remote_applied(const struct remote *remote, const struct remote_field *field);
 void remote_sample(struct remote *remote);
 void remote_look_for_shorts(struct remote *remote);
+
+/* remote.c */
 void remote_add_fault(struct remote *remote, uint8_t fault);
 
 #endif
