@@ -14,7 +14,7 @@ static void take_bits(struct sserial_field *const field, const uint32_t *const w
     for (unsigned done = 0; done < field->bits; done += 32u) {
         const unsigned count = field->bits - done < 32u ? field->bits - done : 32u;
         const uint32_t word = (uint32_t)sslbp_get_bits(words, field->in_at + done, count);
-        hm2_show_levels(field->as.bit.in + done, word, UINT32_MAX >> (32u - count));
+        hm2_show_levels(field->as.bit.in + done, word, count < 32u ? (1u << count) - 1u : UINT32_MAX);
     }
 }
 

@@ -144,8 +144,10 @@ int sserial_find(const struct hm2_module *const module, struct hm2_setup *const 
     int err = open_port(setup, port, access);
     if (err < 0)
         return err == HM2_ERR_MISMATCH || err == HM2_ERR_TIMEOUT ? 0 : err;
-    channels &= (1u << access->channels) - 1u;
-    if (setup->config->sserial_baudrate > 0)
+    const unsigned beyond = channels & ~((1u << access->channels) - 1u);
+    channels &= ~beyond;
+    err = tell_all_missing(setup, access, port, beyond, "which is beyond the channels of the port's firmware");
+    if (err == 0 && setup->config->sserial_baudrate > 0)
         err = sslbp_port_baud(access, (uint32_t)setup->config->sserial_baudrate);
     if (err == 0)
         err = sslbp_port_start(access, channels, false, modes, &failed);

@@ -63,7 +63,7 @@ int sserial_bind_port(const struct hm2_setup *const setup, struct sserial_port *
 /* ---- rows of a remote ---------------------------------------------------------------------------------------------
  */
 
-enum initial { ZERO, ONE, MAX, MIN, FULL_TURN };
+enum initial { ZERO, MAX, MIN, FULL_TURN };
 
 /* A point of a field: its name is the field's and the suffix. */
 struct template
@@ -175,7 +175,7 @@ struct making {
 
 static double initial_value(const struct sslbp_field *const source, const enum initial initial)
 {
-    const double values[] = {[ZERO] = 0.0, [ONE] = 1.0, [MAX] = source->max, [MIN] = source->min, [FULL_TURN] = 256.0};
+    const double values[] = {[ZERO] = 0.0, [MAX] = source->max, [MIN] = source->min, [FULL_TURN] = 256.0};
     return values[initial];
 }
 

@@ -6,14 +6,14 @@
 
 #include "sserial_state.h"
 
-#define STATE_STOPPED 0xC1u /* status of a channel that is not started */
-#define STATUS_FAILED 0xE1u
-#define STATE_FAILED  0x01u
-#define STATE_PROBING 0x02u
-#define STATE_ASKED   0x04u
-#define STATE_READY   0x3Bu
-#define STATE_SETUP   0x40u
-#define STATE_RUNNING 0x42u
+#define STATUS_STOPPED 0xC1u /* of a channel that is not started */
+#define STATUS_FAILED  0xE1u
+#define STATE_FAILED   0x01u
+#define STATE_PROBING  0x02u
+#define STATE_ASKED    0x04u
+#define STATE_READY    0x3Bu
+#define STATE_SETUP    0x40u
+#define STATE_RUNNING  0x42u
 
 #define SETUP_COMMAND 0x0Fu
 #define SHORT_CLK     190 /* nothing to do */
@@ -110,9 +110,9 @@ static void reset(struct sserial_channel *const c)
 {
     c->link = SSERIAL_STOPPED;
     c->faults = c->state = c->local = 0;
-    c->status = STATE_STOPPED;
+    c->status = STATUS_STOPPED;
     c->errors = 0;
-    c->stale = false;
+    c->stale = c->starting = false;
     memset(c->user_in, 0, sizeof c->user_in);
 }
 
@@ -212,7 +212,7 @@ int64_t sserial_start(struct sim_module *const m, struct sserial_port *const p, 
         if (!(p->named >> i & 1u) || (c->link != SSERIAL_STOPPED && c->link != SSERIAL_FAILED))
             continue; /* one that is started stays as it is */
         start_channel(m, p, i);
-        c->fresh = true;
+        c->starting = true;
         const int64_t good = setup ? SETUP_CLK : START_CLK;
         const int64_t takes = c->link == SSERIAL_FAILED ? no_remote_clk(setup) : good;
         longest = takes > longest ? takes : longest;
@@ -293,22 +293,20 @@ static void greet(struct sim_module *const m, struct sserial_port *const p, cons
 
 void sserial_start_done(struct sim_module *const m, struct sserial_port *const p, const int64_t clk)
 {
-    unsigned last = 0; /* channel that failed */
-    bool several = false;
+    unsigned failed = 0, last = 0;
     for (unsigned i = 0; i < p->channel_count; i++) {
-        if (!(p->named >> i & 1u) || p->channels[i].link != SSERIAL_FAILED || !p->channels[i].fresh)
+        if (!p->channels[i].starting || p->channels[i].link != SSERIAL_FAILED)
             continue;
-        several = several || last > 0 || i > 0;
+        failed++;
         last = i;
     }
     for (unsigned i = 0; i < p->channel_count; i++) {
         struct sserial_channel *const c = &p->channels[i];
-        if (!(p->named >> i & 1u) || !c->fresh || c->state == STATE_READY || c->state == STATE_SETUP)
-            continue;
-        if (c->link == SSERIAL_FAILED)
-            fail(p, i, several && i == last);
-        else
+        if (c->starting && c->link == SSERIAL_FAILED)
+            fail(p, i, failed > 1 && i == last);
+        else if (c->starting)
             greet(m, p, i, clk);
+        c->starting = false;
     }
 }
 
@@ -335,10 +333,7 @@ static uint32_t cs_probing(const struct sserial_channel *const c, const int64_t 
 uint32_t sserial_cs(const struct sserial_port *const p, const unsigned channel, const int64_t clk)
 {
     const struct sserial_channel *const c = &p->channels[channel];
-    const unsigned high = p->running >> 8;
-    const bool starting = p->mode == SSERIAL_BUSY && (high == 0x09 || high == SETUP_COMMAND) &&
-                          (p->running >> channel & 1u) && c->status == STATE_STOPPED;
-    if (!starting)
+    if (!c->starting)
         return cs_word(c);
     const int64_t passed = clk - p->since;
     if (c->link == SSERIAL_FAILED)
@@ -523,7 +518,7 @@ static int64_t clk_of(const struct sim_module *const m, const int64_t ns)
 /* After a START the firmware sends zeros to the remote until the first DOIT comes (seed 003, "NORMAL START"). */
 static bool kept_alive(const struct sserial_channel *const c)
 {
-    return c->link == SSERIAL_READY && c->cable != SIM_CABLE_OUT;
+    return c->link == SSERIAL_READY && !c->starting && c->cable != SIM_CABLE_OUT;
 }
 
 void sserial_keep_alive(const struct sim_module *const m, struct sserial_port *const p, const int64_t clk)

@@ -46,7 +46,7 @@ struct sserial_channel {
     bool reached;    /* the message on its way comes to the remote */
     uint8_t pending; /* error of the message on its way: a local fault bit */
     bool stale;      /* CS is reset when the next command comes */
-    bool fresh;      /* no DOIT since START */
+    bool starting;   /* by the START that is being carried out */
     /* The host's side */
     uint32_t cs_out, user_out[SSERIAL_USERS];
 };

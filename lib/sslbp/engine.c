@@ -128,8 +128,9 @@ static void take_transfer(struct sslbp_engine *const engine, struct sslbp_channe
 
 static void take_cs(struct sslbp_engine *const engine, const struct sslbp_reply *const reply)
 {
+    const unsigned mask = engine->mask;
     for (unsigned i = 0; i < SSLBP_CHANNELS; i++)
-        if (engine->mask >> i & 1u)
+        if (mask >> i & 1u)
             engine->channel[i].cs = reply->cs[i];
 }
 
@@ -157,11 +158,11 @@ static bool is_same(const struct sslbp_identity *const a, const uint32_t user[3]
 
 static void take_start(struct sslbp_engine *const engine, const struct sslbp_reply *const reply)
 {
-    const unsigned failed = reply->data & engine->mask;
+    const unsigned mask = engine->mask, failed = reply->data & mask;
     take_cs(engine, reply);
     for (unsigned i = 0; i < SSLBP_CHANNELS; i++) {
         struct sslbp_channel *const channel = &engine->channel[i];
-        if (!(engine->mask >> i & 1u))
+        if (!(mask >> i & 1u))
             continue;
         const bool same = is_same(&channel->identity, reply->user[i]);
         channel->started = !(failed >> i & 1u) && same;

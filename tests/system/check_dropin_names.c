@@ -7,6 +7,7 @@
  */
 #include <check.h>
 #include <errno.h>
+#include <fnmatch.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -211,6 +212,19 @@ static void compare_text(const char *const what, const struct object *const obje
         differs(what, object, their_text, our_text);
 }
 
+/* Values that depend on the moment at which they are looked at. */
+static bool rests(const char *const name)
+{
+    static const char *const restless[] = {
+        "gpio.041.in*",      /* of a 7I77: the select line of its encoders */
+        "7i7[67].0.?.fault", /* a remote's watchdog bites, or not yet, while it is asked */
+    };
+    for (size_t i = 0; i < sizeof restless / sizeof restless[0]; i++)
+        if (fnmatch(restless[i], name, 0) == 0)
+            return false;
+    return true;
+}
+
 static void compare(void)
 {
     for (unsigned i = 0; i < theirs.count; i++) {
@@ -221,7 +235,8 @@ static void compare(void)
         }
         compare_text("type", a, a->type, b->type);
         compare_text("direction", a, a->direction, b->direction);
-        compare_text("value", a, a->value, b->value);
+        if (rests(a->name))
+            compare_text("value", a, a->value, b->value);
     }
     for (unsigned i = 0; i < ours.count; i++) {
         const struct object *const b = &ours.objects[i];

@@ -25,6 +25,8 @@ static void nothing_given_takes_everything_the_firmware_has(void **state)
         assert_false(config.sserial_given);
         assert_memory_equal(config.sserial_mode[3], "00000000", 8);
         assert_int_equal(hm2_config_sserial_ports(&config, 3), 3);
+        assert_int_equal(config.sserial_baudrate, -1);
+        assert_false(config.use_serial_numbers);
         assert_string_equal(config.ssi_format[31], "");
     }
 }
@@ -67,6 +69,7 @@ static void a_whole_line_of_a_machine_is_read(void **state)
     assert_false(config.sserial_port_given[0]);
     assert_true(config.sserial_port_given[1]);
     assert_memory_equal(config.sserial_mode[1], "0x300000", 8);
+    assert_int_equal(config.sserial_named[1], 3);
     assert_memory_equal(config.sserial_mode[0], "00000000", 8);
     assert_string_equal(config.ssi_format[3], "nul%1bmpos%24ge");
     assert_string_equal(config.fanuc_format[31], "AA64");

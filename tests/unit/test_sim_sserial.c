@@ -118,6 +118,18 @@ static void a_start_names_both_processors_of_a_7i77(void **state)
     assert_int_equal(cs(rig, FIELD), 0x003B0000);
 }
 
+static void what_is_started_is_not_started_again_without_a_stop(void **state)
+{
+    const struct rig *const rig = *state;
+    assert_int_equal(command(rig, 0x0901), 0);
+    put(rig, USER0 + 4 * FIELD, 0xF);
+    assert_int_equal(command(rig, 0x1001), 0);
+    assert_int_equal(command(rig, 0x0903), 0);
+    assert_int_equal(cs(rig, FIELD), 0x00420000);
+    assert_int_equal(cs(rig, ANALOG), 0x003B0000);
+    assert_true(output(rig, FIELD, "Output") == 0xF);
+}
+
 static void a_missing_remote_fails_its_channel_alone(void **state)
 {
     const struct rig *const rig = *state;
@@ -535,6 +547,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
         TEST(a_start_names_both_processors_of_a_7i77),
+        TEST(what_is_started_is_not_started_again_without_a_stop),
         TEST(a_missing_remote_fails_its_channel_alone),
         TEST(channels_that_the_firmware_lacks_do_not_start),
         TEST(pins_that_are_no_outputs_leave_the_remote_deaf),
