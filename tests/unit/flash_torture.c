@@ -42,7 +42,8 @@ static void take_image(struct torture *const t, const size_t late_bytes)
     if (area == SIM_AREA_USER)
         t->options.file_name = efinix(t) ? "7i96s.bin" : "7i93.bit";
     t->filler_at = start_of(t, area) + (uint32_t)t->image.payload_bytes;
-    for (size_t i = 0; i < t->image.payload_bytes; i++)
+    const size_t pages = (t->image.payload_bytes + FLASH_PAGE_BYTES - 1) / FLASH_PAGE_BYTES;
+    for (size_t i = 0; i < pages * FLASH_PAGE_BYTES; i++)
         t->wanted[start_of(t, area) + i] = flash_image_byte(&t->image, i);
 }
 
@@ -159,9 +160,8 @@ void torture_check_starts(const struct torture *const t, const char *const what,
 
 void torture_check_wanted(const struct torture *const t, const char *const what, const uint64_t number)
 {
-    const size_t filler_end = (t->filler_at + FLASH_PAGE_BYTES - 1) / FLASH_PAGE_BYTES * FLASH_PAGE_BYTES;
     for (size_t i = 0; i < t->size; i++)
-        if ((i < t->filler_at || i >= filler_end) && t->flash[i] != t->wanted[i])
+        if (t->flash[i] != t->wanted[i])
             fail_msg("%s, %s %" PRIu64 ": byte 0x%06zX is 0x%02X instead of 0x%02X", t->profile, what, number, i,
                      t->flash[i], t->wanted[i]);
     if (sim_card_would_boot(t->sim) != SIM_BOOT_USER)

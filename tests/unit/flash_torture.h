@@ -21,7 +21,7 @@ struct torture {
     size_t size;
     uint8_t *file; /* that is written */
     struct flash_image image;
-    uint32_t filler_at; /* behind the image to the end of its page: not judged; 0 = none */
+    uint32_t filler_at; /* behind the image to the end of its page: no part of it; 0 = none */
     struct flash_options options;
     struct hm2_diag diag;
     uint64_t operations; /* that an undisturbed run takes */
