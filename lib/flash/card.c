@@ -10,6 +10,7 @@
 #define ID_WORDS       4u
 #define INFO_WORDS     (LBP16_INFO_BYTES / 2u)
 #define TIMER_SPACE_IN 3u /* first LBP16 version that has space 4 (flash tool reference 1.4.1) */
+#define FIRST_TRIES    5u /* 2.5 s */
 #define QUIET_NS       INT64_C(100000000)
 #define QUIET_ROUNDS   3u
 
@@ -80,7 +81,7 @@ static int read_first(struct flash_card *const card, struct hm2_diag *const diag
     (void)lbp16_add_read_hm2(&port->builder, HM2_ADDR_COOKIE, ID_WORDS, &id_at);
     for (unsigned i = 0; i < sizeof spaces / sizeof spaces[0]; i++)
         (void)lbp16_add_read_info(&port->builder, spaces[i], &area_at[i]);
-    const int err = flash_port_run(port, FLASH_WORK_READ, FLASH_TRIES);
+    const int err = flash_port_run(port, FLASH_WORK_READ, FIRST_TRIES);
     if (err < 0)
         return silent(diag);
     take_name(info, port->reply + name_at);

@@ -350,11 +350,34 @@ int do_backup(struct cli *const cli, const char *const arg)
     return status;
 }
 
+/* The side file that a backup of ours has beside it: the first line names the card (H13). */
+static int check_origin(struct cli *const cli, const char *const path)
+{
+    enum { MOST = 4096 };
+    static const char key[] = "card: ";
+    char side[4096];
+    size_t len;
+    snprintf(side, sizeof side, "%s.card", path);
+    uint8_t *const text = read_file(side, MOST, &len);
+    if (!text)
+        return DONE; /* mesaflash makes none */
+    int status = DONE;
+    text[len] = '\0';
+    text[strcspn((char *)text, "\r\n")] = '\0';
+    if (strncmp((char *)text, key, sizeof key - 1) == 0 && strcmp((char *)text + sizeof key - 1, card_name(cli)) != 0)
+        status = complain(cli, REFUSED, "the dump is from a %.32s and this card is a %s", (char *)text + sizeof key - 1,
+                          card_name(cli));
+    free(text);
+    return status;
+}
+
 static int restore_dump(struct cli *const cli, const char *const path, const uint8_t *const dump, const size_t len)
 {
     struct flash_job *job = NULL;
     struct outcome outcome;
     int status = check_side_file(cli, path, dump, len, true, "Backup file");
+    if (status == DONE)
+        status = check_origin(cli, path);
     if (status != DONE)
         return status;
     const struct flash_options options = options_of(cli, path);

@@ -7,7 +7,7 @@
  *
  * Everything runs on a struct link and in its clock, so that it works in virtual time as well. Parsers and tables are
  * pure. Functions that talk to a card return after at most a few bounded tries; none is for a realtime thread. Only
- * flash_card_new() and flash_job_new() allocate. A card and its jobs are used by one thread at a time.
+ * flash_card_new() and the functions that make jobs allocate. A card and its jobs are used by one thread at a time.
  *
  * Errors: HM2_ERR_MISMATCH and HM2_ERR_STATE = refused, nothing was changed; HM2_ERR_TIMEOUT = the card was lost;
  * HM2_ERR_IO = the flash does not hold what was written; HM2_ERR_MALFORMED = the file or an answer breaks its format.
