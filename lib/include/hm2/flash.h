@@ -189,6 +189,20 @@ HM2_API int HM2_MUST_CHECK flash_card_quiet(struct flash_card *card, struct hm2_
 /* Number of I/O pins that are outputs now (H19); negative = error. */
 HM2_API int HM2_MUST_CHECK flash_card_outputs(struct flash_card *card, struct hm2_diag *diag);
 
+/* What is at a smart-serial port. The port is reset and its pins are switched to it meanwhile: refuse before (see
+ * flash_card_quiet()) when a machine may run. HM2_ERR_NOTFOUND, without a sentence, when there is no such port. */
+#define FLASH_SSERIAL_CHANNELS 8u
+struct flash_sserial {
+    uint8_t type, width, major, minor, processor;
+    unsigned channels;
+    uint32_t baud;
+    bool present[FLASH_SSERIAL_CHANNELS]; /* a remote device answered */
+    uint32_t unit[FLASH_SSERIAL_CHANNELS];
+    char name[FLASH_SSERIAL_CHANNELS][5];
+};
+HM2_API int HM2_MUST_CHECK flash_card_sserial(struct flash_card *card, unsigned port, struct flash_sserial *out,
+                                              struct hm2_diag *diag);
+
 /* Any memory space of 16-bit items, and HostMot2's registers. */
 HM2_API int HM2_MUST_CHECK flash_card_read16(struct flash_card *card, enum lbp16_space space, uint16_t address,
                                              unsigned count, uint16_t *words, struct hm2_diag *diag);
