@@ -288,7 +288,7 @@ int flash_card_outputs(struct flash_card *const card, struct hm2_diag *const dia
         return 0;
     const struct hm2_md *const ports = hm2_idrom_find(&idrom, HM2_GTAG_IOPORT);
     for (unsigned i = 0; ports && i < ports->instances; i++) {
-        uint32_t word;
+        uint32_t word = 0;
         const int err = flash_card_read_hm2(card, hm2_md_address(ports, DDR, i), 1, &word, diag);
         if (err < 0)
             return err;
@@ -363,7 +363,7 @@ int flash_card_write_eeprom(struct flash_card *const card, const uint16_t addres
     enum { MOST = 16 };
     static const uint16_t key = 0x5A02;
     struct flash_port *const port = &card->port;
-    uint16_t back[MOST];
+    uint16_t back[MOST] = {0};
     if (count > MOST || address < LBP16_EEPROM_IP || address + 2u * count > LBP16_EEPROM_BYTES)
         return hm2_diag_add(diag, HM2_ERR_RANGE, "settings at 0x%02X to 0x%02X cannot be written", (unsigned)address,
                             (unsigned)(address + 2u * count));

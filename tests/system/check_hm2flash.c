@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* hm2flash as a program, on simulated cards over UDP: what it prints, does, refuses, and its exit status. */
 #include <check.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,22 +32,19 @@ static void tear_down(void)
     flash_rig_clean();
 }
 
-/* Run with these arguments (NULL-terminated) and expect this status. */
-static const char *run(const int status, const char *arg, ...)
+/* Run with these arguments and expect this status; what it printed. */
+static const char *run_with(const int status, const char *const *const args)
 {
     const char *argv[MAX_ARGS] = {process_built("hm2flash")};
-    unsigned n = 1;
-    va_list args;
-    va_start(args, arg);
-    for (; arg; arg = va_arg(args, const char *)) {
-        ck_assert_uint_lt(n + 1, MAX_ARGS);
-        argv[n++] = arg;
+    for (unsigned n = 0; args[n]; n++) {
+        ck_assert_uint_lt(n + 2, MAX_ARGS);
+        argv[n + 1] = args[n];
     }
-    va_end(args);
     const int got = process_run(&tool, argv, RUN_MS);
     ck_assert_msg(got == status, "status %d instead of %d: %s", got, status, tool.text);
     return tool.text;
 }
+#define run(status, ...) run_with(status, (const char *const[]){__VA_ARGS__, NULL})
 
 static void printed(const char *const words)
 {
@@ -64,9 +60,9 @@ START_TEST(identifies_a_card)
 {
     char line[64];
     snprintf(line, sizeof line, "\nETH device 7I96S at ip=%s\n", sim.address[0]);
-    ck_assert_str_eq(run(DONE, "--device", "7i96s", "--addr", sim.address[0], NULL), line);
-    ck_assert_str_eq(run(DONE, "-device", "ether", "-addr", sim.address[0], NULL), line);
-    run(DONE, "--device", "ETHER", "--addr", sim.address[1], "--verbose", NULL);
+    ck_assert_str_eq(run(DONE, "--device", "7i96s", "--addr", sim.address[0]), line);
+    ck_assert_str_eq(run(DONE, "-device", "ether", "-addr", sim.address[0]), line);
+    run(DONE, "--device", "ETHER", "--addr", sim.address[1], "--verbose");
     printed("  FPGA type: 6slx9tqg144\n");
     printed("  flash: sector 0: boot block, fallback area: Xilinx image, user area: blank\n");
 }
@@ -74,39 +70,39 @@ END_TEST
 
 START_TEST(tells_what_is_wrong_by_its_exit_status)
 {
-    run(REFUSED, "--device", "7i96", "--addr", sim.address[0], NULL);
+    run(REFUSED, "--device", "7i96", "--addr", sim.address[0]);
     printed("No 7I96 board found\n");
     printed("is a 7I96S, not a 7I96");
-    run(USAGE, "--device", "7i99", "--addr", sim.address[0], NULL);
+    run(USAGE, "--device", "7i99", "--addr", sim.address[0]);
     printed("ERROR: Unsupported device 7I99\n");
-    run(USAGE, "--device", "7i96s", NULL);
+    run(USAGE, "--device", "7i96s");
     printed("You must supply an IP address for Ethernet cards\nNo 7I96S board found\n");
-    run(LOST, "--device", "7i96s", "--addr", "127.255.255.254", NULL);
+    run(LOST, "--device", "7i96s", "--addr", "127.255.255.254");
     printed("No 7I96S board found\n");
     printed("192.168.1.121");
-    run(REFUSED, "--info", "/nonexistent", NULL);
-    run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--rpo", "garbage", NULL);
-    run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--wpo", "0x1000", NULL);
-    run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--set", "ip=", NULL);
-    run(REFUSED, "--device", "7i96s", "--addr", sim.address[0], "--set", "ip=224.0.0.1", NULL);
-    run(REFUSED, "--device", "7i96s", "--addr", sim.address[0], "--expect-mac", "00:00:00:00:00:01", NULL);
+    run(REFUSED, "--info", "/nonexistent");
+    run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--rpo", "garbage");
+    run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--wpo", "0x1000");
+    run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--set", "ip=");
+    run(REFUSED, "--device", "7i96s", "--addr", sim.address[0], "--set", "ip=224.0.0.1");
+    run(REFUSED, "--device", "7i96s", "--addr", sim.address[0], "--expect-mac", "00:00:00:00:00:01");
 }
 END_TEST
 
 START_TEST(writes_verifies_and_starts_an_image)
 {
     const char *const address = sim.address[0], *const image = image_7i96s(1);
-    run(DONE, "--device", "7i96s", "--addr", address, "--write", image, "--dry-run", NULL);
+    run(DONE, "--device", "7i96s", "--addr", address, "--write", image, "--dry-run");
     printed("Nothing was changed.");
-    run(FAILED, "--device", "7i96s", "--addr", address, "--verify", image, NULL);
+    run(FAILED, "--device", "7i96s", "--addr", address, "--verify", image);
     printed("expected: 0xA but read: 0xFF\n");
-    run(DONE, "--device", "7i96s", "--addr", address, "--write", image, "--reload", NULL);
+    run(DONE, "--device", "7i96s", "--addr", address, "--write", image, "--reload");
     printed("  |WWWW");
     printed("Board configuration verified successfully.\n");
     printed("is back after");
     printed("user image");
-    run(DONE, "--device", "7i96s", "--addr", address, "--verify", image, NULL);
-    run(DONE, "--device", "7i96s", "--addr", address, "--write", image, "--json", NULL);
+    run(DONE, "--device", "7i96s", "--addr", address, "--verify", image);
+    run(DONE, "--device", "7i96s", "--addr", address, "--write", image, "--json");
     printed("\"sectors_same\": 11, \"sectors_erased\": 0, \"pages_written\": 0");
     ck_assert_str_eq(simulator_ask(&sim, "card 0 boots"), "runs user boots user");
 }
@@ -115,14 +111,14 @@ END_TEST
 START_TEST(refuses_before_it_erases)
 {
     const char *const address = sim.address[1];
-    run(REFUSED, "--device", "7i93", "--addr", address, "--write", image_7i96s(1), NULL);
+    run(REFUSED, "--device", "7i93", "--addr", address, "--write", image_7i96s(1));
     printed("wrong bitfile destination device: T20F256, should be 6slx9tqg144");
     const char *const other = flash_rig_image("7i92_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 2});
-    run(REFUSED, "--device", "7i93", "--addr", address, "--write", other, NULL);
+    run(REFUSED, "--device", "7i93", "--addr", address, "--write", other);
     printed("is for a 7I92");
-    run(REFUSED, "--device", "7i93", "--addr", address, "--write", other, "--override", "7I92", NULL);
-    run(REFUSED, "--device", "7i93", "--addr", address, "--write", other, "--sha256-check", NULL);
-    run(DONE, "--device", "7i93", "--addr", address, "--write", other, "--override", "7I93", NULL);
+    run(REFUSED, "--device", "7i93", "--addr", address, "--write", other, "--override", "7I92");
+    run(REFUSED, "--device", "7i93", "--addr", address, "--write", other, "--sha256-check");
+    run(DONE, "--device", "7i93", "--addr", address, "--write", other, "--override", "7I93");
 }
 END_TEST
 
@@ -130,19 +126,19 @@ START_TEST(backs_up_and_restores)
 {
     const char *const address = sim.address[1], *const dump = flash_rig_path("dump.bin");
     const char *const image = flash_rig_image("7i93_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 3});
-    run(DONE, "--device", "7i93", "--addr", address, "--backup-flash", dump, NULL);
+    run(DONE, "--device", "7i93", "--addr", address, "--backup-flash", dump);
     printed("FLASH memory backup file '");
     printed("Checksum file '");
-    run(REFUSED, "--device", "7i93", "--addr", address, "--backup-flash", dump, NULL);
+    run(REFUSED, "--device", "7i93", "--addr", address, "--backup-flash", dump);
     printed("already exist");
-    run(DONE, "--device", "7i93", "--addr", address, "--write", image, NULL);
-    run(DONE, "--device", "7i93", "--addr", address, "--restore-flash", dump, NULL);
+    run(DONE, "--device", "7i93", "--addr", address, "--write", image);
+    run(DONE, "--device", "7i93", "--addr", address, "--restore-flash", dump);
     printed("Backup file integrity verification passed\n");
-    run(DONE, "--device", "7i93", "--addr", address, "--verify", dump, NULL);
-    run(REFUSED, "--device", "7i96s", "--addr", sim.address[0], "--restore-flash", dump, NULL);
+    run(DONE, "--device", "7i93", "--addr", address, "--verify", dump);
+    run(REFUSED, "--device", "7i96s", "--addr", sim.address[0], "--restore-flash", dump);
     printed("the dump is from a 7I93");
     ck_assert_int_eq(truncate(dump, 100), 0);
-    run(REFUSED, "--device", "7i93", "--addr", address, "--restore-flash", dump, NULL);
+    run(REFUSED, "--device", "7i93", "--addr", address, "--restore-flash", dump);
     printed("integrity verification not passed\n");
 }
 END_TEST
@@ -150,22 +146,22 @@ END_TEST
 START_TEST(sets_and_reads_settings_and_registers)
 {
     const char *const address = sim.address[0];
-    run(DONE, "--device", "7i96s", "--addr", address, "--set", "ip=192.168.5.7", NULL);
+    run(DONE, "--device", "7i96s", "--addr", address, "--set", "ip=192.168.5.7");
     printed("Board IP updated successfully.\n");
     printed("You must power cycle board to load updated eeprom settings.\n");
     printed("warning: the card does not take its address from the EEPROM");
-    run(DONE, "--device", "7i96s", "--addr", address, "--set", "netmask=255.255.0.0", NULL);
-    run(REFUSED, "--device", "7i96s", "--addr", address, "--set", "netmask=255.0.255.0", NULL);
-    run(DONE, "--device", "7i96s", "--addr", address, "--set", "ledmode=1", NULL);
-    run(DONE, "--device", "7i96s", "--addr", address, "--json", NULL);
+    run(DONE, "--device", "7i96s", "--addr", address, "--set", "netmask=255.255.0.0");
+    run(REFUSED, "--device", "7i96s", "--addr", address, "--set", "netmask=255.0.255.0");
+    run(DONE, "--device", "7i96s", "--addr", address, "--set", "ledmode=1");
+    run(DONE, "--device", "7i96s", "--addr", address, "--json");
     printed("\"eeprom_ip\": \"192.168.5.7\", \"eeprom_netmask\": \"255.255.0.0\", \"led_mode\": 1");
-    ck_assert_str_eq(run(DONE, "--device", "7i96s", "--addr", address, "--rpo", "0x100", NULL), "55AACAFE\n");
-    run(DONE, "--device", "7i96s", "--addr", address, "--wpo", "0x1100=0x21", NULL);
+    ck_assert_str_eq(run(DONE, "--device", "7i96s", "--addr", address, "--rpo", "0x100"), "55AACAFE\n");
+    run(DONE, "--device", "7i96s", "--addr", address, "--wpo", "0x1100=0x21");
     ck_assert_uint_eq(simulator_read(&sim, 0, 0x1100), 0x21);
-    run(REFUSED, "--device", "7i96s", "--addr", address, "--reload", NULL);
+    run(REFUSED, "--device", "7i96s", "--addr", address, "--reload");
     printed("2 pins of the card are outputs");
-    run(DONE, "--device", "7i96s", "--addr", address, "--safe-io", NULL);
-    run(DONE, "--device", "7i96s", "--addr", address, "--reset", NULL);
+    run(DONE, "--device", "7i96s", "--addr", address, "--safe-io");
+    run(DONE, "--device", "7i96s", "--addr", address, "--reset");
     printed("is back after");
 }
 END_TEST
@@ -174,17 +170,17 @@ START_TEST(works_on_many_cards_and_finds_them)
 {
     char both[40], line[96];
     snprintf(both, sizeof both, "%s,%s", sim.address[0], sim.address[1]);
-    run(DONE, "--device", "ether", "--addr", both, NULL);
+    run(DONE, "--device", "ether", "--addr", both);
     for (unsigned i = 0; i < 2; i++) {
         snprintf(line, sizeof line, "%s: ETH device %s at ip=%s\n", sim.address[i], i ? "7I93" : "7I96S",
                  sim.address[i]);
         printed(line);
     }
-    run(REFUSED, "--device", "7i93", "--addr", both, NULL); /* one of them is */
-    run(DONE, "--discover", "--addr", both, NULL);
+    run(REFUSED, "--device", "7i93", "--addr", both); /* one of them is */
+    run(DONE, "--discover", "--addr", both);
     printed("7I96S");
     printed("fallback: Xilinx image, user: blank");
-    run(LOST, "--discover", "--addr", "127.255.255.254", NULL);
+    run(LOST, "--discover", "--addr", "127.255.255.254");
 }
 END_TEST
 
