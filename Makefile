@@ -235,10 +235,10 @@ $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPE
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) -Wl,--whole-archive $(HOST_A) \
 		-Wl,--no-whole-archive $(LIB_A) $(CHECK_LIBS) -rdynamic -lm -lpthread -ldl
 
-$(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(HOST_A) $(LIB_A)
+$(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(HOST_A) $(SIM_A) $(LIB_A)
 	@mkdir -p $(@D)
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) -Wl,--whole-archive $(HOST_A) \
-		-Wl,--no-whole-archive $(LIB_A) -rdynamic -lm -lpthread -ldl
+		-Wl,--no-whole-archive $(SIM_A) $(LIB_A) -rdynamic -lm -lpthread -ldl
 
 # Some of them load components into LinuxCNC, and skip that where it is not installed.
 $(SYSTEM_BIN): | $(if $(shell command -v $(halcompile)),$(LINUXCNC_SO))
@@ -258,6 +258,7 @@ check-system: all $(SYSTEM_BIN)
 
 bench: all $(BENCH_BIN) ## compare with the peers, as ratios, in one run
 	@tests/bench/run $(BUILDDIR)
+	@tests/bench/flash $(BUILDDIR)
 
 fuzz: ## run every fuzz harness for FUZZ_SECONDS
 	@$(MAKE) --no-print-directory BUILDDIR=$(BUILDDIR)/fuzz-objects CC=$(FUZZ_CC) \

@@ -106,21 +106,28 @@ static void finish_plan(struct flash_job *const job)
     job_enter(job, job->kind == JOB_WRITE ? JOB_PLANNED : JOB_END);
 }
 
+/* A write minds the filler of the last page, too: mesaflash compares whole pages. For a verify only the image counts.
+ */
+static uint32_t judged_bytes(const struct flash_job *const job, const struct job_pass *const pass)
+{
+    const uint32_t pages = (pass->bytes + FLASH_PAGE_BYTES - 1) / FLASH_PAGE_BYTES;
+    return job->kind == JOB_WRITE ? pages * FLASH_PAGE_BYTES : pass->bytes;
+}
+
 /* Where the comparison goes on: behind a sector that is erased anyway, which need not be read to its end. */
 static uint32_t skip_erased(const struct flash_job *const job, const struct job_pass *const pass, uint32_t offset)
 {
-    const uint32_t at = pass->range.start + offset;
-    if (job->kind == JOB_WRITE && offset < pass->bytes &&
-        job->plan.state[at / FLASH_SECTOR_BYTES] == FLASH_SECTOR_ERASE)
+    const uint32_t at = pass->range.start + offset, end = judged_bytes(job, pass);
+    if (job->kind == JOB_WRITE && offset < end && job->plan.state[at / FLASH_SECTOR_BYTES] == FLASH_SECTOR_ERASE)
         offset = (at / FLASH_SECTOR_BYTES + 1) * FLASH_SECTOR_BYTES - pass->range.start;
-    return offset < pass->bytes ? offset : pass->bytes;
+    return offset < end ? offset : end;
 }
 
 int job_compare(struct flash_job *const job, struct hm2_diag *const diag)
 {
     const struct job_pass *const pass = &job->passes[job->pass];
-    const uint32_t at = pass->range.start + job->cursor;
-    size_t len = pass->bytes - job->cursor;
+    const uint32_t at = pass->range.start + job->cursor, end = judged_bytes(job, pass);
+    size_t len = end - job->cursor;
     if (len > sizeof job->chunk)
         len = sizeof job->chunk;
     /* Not into the next sector: that may be decided by its own beginning, as this one is. */
@@ -140,7 +147,7 @@ int job_compare(struct flash_job *const job, struct hm2_diag *const diag)
         job_enter(job, JOB_END);
         return 0;
     }
-    if (job->cursor < pass->bytes)
+    if (job->cursor < end)
         return 0;
     job->cursor = 0;
     if (++job->pass == job->pass_count)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * Loading an image as the FPGA does: Spartan-6 packets (flash tool reference 3.8, 3.10, 3.13), Trion by its sync word.
- * The check sums are the simulation's own: CRC-32 from the sync word to the packet that carries it; of the body.
+ * The check sums are the simulation's own: from the sync word to the packet that carries it; of header and body.
  */
 #include "boot.h"
 
@@ -19,19 +19,19 @@ const uint8_t sim_stamp[SIM_STAMP_BOARD_AT] = "libhm2 simulated";
 /* ---- check sum ----------------------------------------------------------------------------------------------------
  */
 
-/* Four bits at a time: the remainders of 0 to 15. */
-uint32_t sim_crc32(uint32_t crc, const uint8_t *const bytes, const size_t len)
+/* Four bytes at a time; each step can be undone, so that no change of one word goes unseen. */
+uint32_t sim_check_sum(uint32_t sum, const uint8_t *const bytes, const size_t len)
 {
-    static const uint32_t table[16] = {0x00000000, 0x1DB71064, 0x3B6E20C8, 0x26D930AC, 0x76DC4190, 0x6B6B51F4,
-                                       0x4DB26158, 0x5005713C, 0xEDB88320, 0xF00F9344, 0xD6D6A3E8, 0xCB61B38C,
-                                       0x9B64C2B0, 0x86D3D2D4, 0xA00AE278, 0xBDBDF21C};
-    crc = ~crc;
-    for (size_t i = 0; i < len; i++) {
-        crc ^= bytes[i];
-        crc = crc >> 4 ^ table[crc & 15u];
-        crc = crc >> 4 ^ table[crc & 15u];
+    size_t i = 0;
+    for (; i + 4 <= len; i += 4) {
+        sum = (sum ^ hm2_get_le32(bytes + i)) * 0x9E3779B1u;
+        sum ^= sum >> 15;
     }
-    return ~crc;
+    for (; i < len; i++) {
+        sum = (sum ^ bytes[i]) * 0x9E3779B1u;
+        sum ^= sum >> 15;
+    }
+    return sum;
 }
 
 void sim_boot_block(const uint32_t flash_size, uint8_t block[const SIM_BOOT_BLOCK_BYTES])
@@ -124,7 +124,7 @@ static bool write_register(struct loading *const l, const unsigned reg, const un
     }
     if (reg == REG_CRC) {
         l->checked = true;
-        l->proven = value == sim_crc32(0, l->flash->bytes + l->sync, packet - l->sync);
+        l->proven = value == sim_check_sum(1, l->flash->bytes + l->sync, packet - l->sync);
         return l->proven || l->flash->trust;
     }
     return true;
@@ -225,9 +225,10 @@ static enum sim_boot start_trion(const struct sim_boot_flash *const flash, const
         return SIM_BOOT_NOTHING;
     const uint32_t body_bytes = hm2_get_le32(image + SIM_EFINIX_LENGTH_AT);
     const bool complete = body_bytes >= SIM_STAMP_BYTES && body_bytes <= room - skip - SIM_EFINIX_BODY_AT;
-    const bool proven = complete && hm2_get_le32(image + SIM_EFINIX_CRC_AT) ==
-                                        sim_crc32(sim_crc32(0, image, SIM_EFINIX_CRC_AT), image + SIM_EFINIX_PART_AT,
-                                                  body_bytes + SIM_EFINIX_BODY_AT - SIM_EFINIX_PART_AT);
+    const bool proven =
+        complete && hm2_get_le32(image + SIM_EFINIX_CRC_AT) ==
+                        sim_check_sum(sim_check_sum(1, image, SIM_EFINIX_CRC_AT), image + SIM_EFINIX_PART_AT,
+                                      body_bytes + SIM_EFINIX_BODY_AT - SIM_EFINIX_PART_AT);
     if (!proven)
         return flash->trust ? started(flash, address, NULL) : SIM_BOOT_NOTHING;
     if (strncmp((const char *)image + SIM_EFINIX_PART_AT, flash->profile->part,

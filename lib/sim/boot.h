@@ -35,8 +35,8 @@ enum sim_boot sim_boot_xilinx(const struct sim_boot_flash *flash, struct sim_boo
 /* Efinix: the user image when it is wanted and good, else the fallback. */
 enum sim_boot sim_boot_efinix(const struct sim_boot_flash *flash, bool want_user);
 
-/* CRC-32 of IEEE 802.3, reflected. Start with 0; previous results go on. */
-uint32_t sim_crc32(uint32_t crc, const uint8_t *bytes, size_t len);
+/* What stands in for the check sum of an image. Start with 1; previous results go on. */
+uint32_t sim_check_sum(uint32_t sum, const uint8_t *bytes, size_t len);
 
 /* The boot block of a chip, 64 bytes (flash tool reference 3.8). */
 #define SIM_BOOT_BLOCK_BYTES 64u

@@ -127,7 +127,7 @@ static void put_packets(struct writer *const w, const struct sim_flash_file *con
     put_be16(w, 0x5060);
     put_be32(w, (uint32_t)(frame_bytes / 2));
     put_body(w, file, profile, frame_bytes);
-    const uint32_t crc = w->len <= w->capacity ? sim_crc32(0, w->out + sync, w->len - sync) : 0;
+    const uint32_t crc = w->len <= w->capacity ? sim_check_sum(1, w->out + sync, w->len - sync) : 0;
     put_be16(w, 0x3002);
     put_be32(w, crc);
     put_be32(w, 0x30A10005);
@@ -198,10 +198,10 @@ static void put_efinix(struct writer *const w, const struct sim_flash_file *cons
     put(w, head, sizeof head);
     put_body(w, file, profile, body);
     if (w->len <= w->capacity) {
-        const uint32_t before = sim_crc32(0, w->out + sync_at, SIM_EFINIX_CRC_AT);
+        const uint32_t before = sim_check_sum(1, w->out + sync_at, SIM_EFINIX_CRC_AT);
         const uint8_t *const behind = w->out + sync_at + SIM_EFINIX_PART_AT;
         hm2_put_le32(w->out + sync_at + SIM_EFINIX_CRC_AT,
-                     sim_crc32(before, behind, w->len - sync_at - SIM_EFINIX_PART_AT));
+                     sim_check_sum(before, behind, w->len - sync_at - SIM_EFINIX_PART_AT));
     }
     static const uint8_t erased[4] = {0xFF, 0xFF, 0xFF, 0xFF};
     for (size_t i = 0; i < padding; i += sizeof erased)

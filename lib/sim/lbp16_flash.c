@@ -86,9 +86,8 @@ static void read_data(struct sim_lbp16 *const e)
         (void)shift(e, READ);
         shift_address(e);
     }
-    e->flash_data = 0;
-    for (unsigned i = 0; i < 4; i++)
-        e->flash_data |= (uint32_t)shift(e, 0) << (8 * i);
+    sim_lbp16_spend(e, 4 * BYTE_CLOCKS);
+    e->flash_data = sim_spi_flash_read4(&e->flash, e->now_ns);
     e->flash_address += 4;
 }
 

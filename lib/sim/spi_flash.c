@@ -212,3 +212,13 @@ uint8_t sim_spi_flash_shift(struct sim_spi_flash *const flash, const uint8_t out
     }
     return now_ns < flash->busy_until_ns ? ERASED : data_phase(flash, out);
 }
+
+uint32_t sim_spi_flash_read4(struct sim_spi_flash *const flash, const int64_t now_ns)
+{
+    if (flash->dead || now_ns < flash->busy_until_ns)
+        return UINT32_MAX;
+    uint32_t value = 0;
+    for (unsigned i = 0; i < 4; i++)
+        value |= (uint32_t)flash->bytes[flash->address++ & (flash->size - 1)] << (8 * i);
+    return value;
+}

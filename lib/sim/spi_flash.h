@@ -39,5 +39,7 @@ void sim_spi_flash_select(struct sim_spi_flash *flash);
 /* Programs and erases begin here. */
 void sim_spi_flash_deselect(struct sim_spi_flash *flash, int64_t now_ns);
 uint8_t sim_spi_flash_shift(struct sim_spi_flash *flash, uint8_t out, int64_t now_ns);
+/* Four bytes of a READ that has its address, least significant first. */
+uint32_t sim_spi_flash_read4(struct sim_spi_flash *flash, int64_t now_ns);
 
 #endif

@@ -111,6 +111,12 @@ int do_reload(struct cli *cli, const char *arg);
 int do_reset(struct cli *cli, const char *arg);
 int do_info(struct cli *cli, const char *arg);
 int do_discover(struct cli *cli, const char *arg);
+int do_report(struct cli *cli, const char *arg);
+
+struct terminals;
+/* Terminal names of a connector (NULL = none) and what they are called, as the options or the card's table say. */
+const struct terminals *terminals_of(const struct cli *cli, unsigned port, const char **name);
+const char *connector_of(const struct cli *cli, unsigned port);
 
 /* Print the header of an image as --info does. */
 void print_image(const struct cli *cli, const struct flash_image *image);

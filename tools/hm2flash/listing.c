@@ -26,7 +26,7 @@ static struct hm2_idrom *idrom_of(struct cli *const cli)
     return &idrom;
 }
 
-static const struct terminals *terminals_of(const struct cli *const cli, const unsigned port, const char **const name)
+const struct terminals *terminals_of(const struct cli *const cli, const unsigned port, const char **const name)
 {
     const struct flash_board *const board = cli->info->board;
     *name = port < CONNECTORS ? cli->dbnames[port] : NULL;
@@ -35,7 +35,7 @@ static const struct terminals *terminals_of(const struct cli *const cli, const u
     return *name ? terminals_find(*name) : NULL;
 }
 
-static const char *connector_of(const struct cli *const cli, const unsigned port)
+const char *connector_of(const struct cli *const cli, const unsigned port)
 {
     const struct flash_board *const board = cli->info->board;
     return board && port < board->io_ports ? board->connectors[port] : "P?";

@@ -34,6 +34,7 @@ static const struct command {
     {"readhmid", NULL, do_readhmid, true, "print the HostMot2 configuration (PIN file); with --xml as XML"},
     {"print-pd", NULL, do_print_pd, true, "print pin descriptors"},
     {"print-lio", NULL, do_print_lio, true, "print local I/O descriptors"},
+    {"report", "FILE", do_report, true, "write a page (HTML) about the card, with its connectors drawn"},
     {"sserial", NULL, do_sserial, true, "print smart-serial ports; resets them"},
     {"rpo", "REGISTER", do_rpo, true, "read a HostMot2 register"},
     {"wpo", "REGISTER=VALUE", do_wpo, true, "write a HostMot2 register"},

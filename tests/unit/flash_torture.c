@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "flash_torture.h"
+
+#include <inttypes.h>
+
+#include "unit.h"
+
+#define START_NS INT64_C(1500000000)
+
+static bool efinix(const struct torture *const t)
+{
+    return strcmp(t->profile, "7i96s") == 0;
+}
+
+static uint32_t start_of(const struct torture *const t, const enum sim_area area)
+{
+    return area == SIM_AREA_USER ? (uint32_t)t->size / 2 : efinix(t) ? 0 : FLASH_SECTOR_BYTES;
+}
+
+static void install(struct torture *const t, const enum sim_area area, const uint64_t late_seed,
+                    const size_t late_bytes)
+{
+    const struct sim_flash_file file = {.profile = t->profile,
+                                        .area = area,
+                                        .seed = late_bytes ? 1 : late_seed,
+                                        .late_seed = late_seed,
+                                        .late_bytes = late_bytes};
+    assert_true(sim_card_install(t->sim, &file) > 0);
+}
+
+/* The image that is to be written, as a file, and where it goes in the wanted state. */
+static void take_image(struct torture *const t, const size_t late_bytes)
+{
+    const enum sim_area area = t->kind == TORTURE_WRITE ? SIM_AREA_USER : SIM_AREA_FALLBACK;
+    const struct sim_flash_file file = {
+        .profile = t->profile, .area = area, .seed = late_bytes ? 1 : 22, .late_seed = 22, .late_bytes = late_bytes};
+    const size_t len = sim_flash_file(&file, t->file, SIM_FLASH_FILE_BYTES);
+    if (flash_image_parse(t->file, len, &t->image, &t->diag) != 0)
+        fail_msg("%s", t->diag.text);
+    t->options.area = t->kind == TORTURE_WRITE ? FLASH_USER : FLASH_FALLBACK;
+    t->options.file_name = efinix(t) ? "7i96s_fallback.bin" : "7i93_fallback.bit";
+    if (area == SIM_AREA_USER)
+        t->options.file_name = efinix(t) ? "7i96s.bin" : "7i93.bit";
+    t->filler_at = start_of(t, area) + (uint32_t)t->image.payload_bytes;
+    const size_t pages = (t->image.payload_bytes + FLASH_PAGE_BYTES - 1) / FLASH_PAGE_BYTES;
+    for (size_t i = 0; i < pages * FLASH_PAGE_BYTES; i++)
+        t->wanted[start_of(t, area) + i] = flash_image_byte(&t->image, i);
+}
+
+struct torture *torture_new(const enum torture_kind kind, const char *const profile, const size_t late_bytes)
+{
+    struct torture *const t = calloc(1, sizeof *t);
+    assert_non_null(t);
+    t->kind = kind;
+    t->profile = profile;
+    const struct sim_card_options options = {.profile = profile, .seed = 3};
+    assert_int_equal(sim_card_new(&t->sim, &options, &t->diag), 0);
+    assert_int_equal(sim_net_new(&t->net, t->sim, NULL), 0);
+    t->flash = sim_card_flash(t->sim, &t->size);
+    t->before = malloc(t->size);
+    t->wanted = malloc(t->size);
+    t->file = malloc(SIM_FLASH_FILE_BYTES);
+    assert_true(t->before && t->wanted && t->file);
+    install(t, SIM_AREA_USER, 22, late_bytes);
+    install(t, SIM_AREA_FALLBACK, 22, late_bytes);
+    memcpy(t->wanted, t->flash, t->size); /* of a restore */
+    install(t, SIM_AREA_USER, 11, late_bytes);
+    install(t, SIM_AREA_FALLBACK, 12, late_bytes);
+    memcpy(t->before, t->flash, t->size);
+    t->options.confirmed = true;
+    if (kind != TORTURE_RESTORE) {
+        memcpy(t->wanted, t->before, t->size);
+        take_image(t, late_bytes);
+    }
+    torture_reset(t);
+    if (torture_run(t) != 0)
+        fail_msg("undisturbed: %s", t->diag.text);
+    t->operations = sim_card_flash_counts(t->sim).operations;
+    torture_check_wanted(t, "undisturbed", 0);
+    return t;
+}
+
+void torture_free(struct torture *const t)
+{
+    sim_net_free(t->net);
+    sim_card_free(t->sim);
+    free(t->before);
+    free(t->wanted);
+    free(t->file);
+    free(t);
+}
+
+void torture_power_up(struct torture *const t)
+{
+    const struct sim_faults none = {0};
+    const struct sim_flash_faults good = {0};
+    struct link *const link = sim_net_link(t->net);
+    assert_int_equal(sim_net_set_faults(t->net, &none), 0);
+    sim_net_sleep_until(t->net, link_now_ns(link) + START_NS); /* whatever is on its way arrives */
+    sim_card_flash_faults(t->sim, &good);
+    sim_card_power_cycle(t->sim);
+    sim_net_sleep_until(t->net, link_now_ns(link) + START_NS);
+    uint8_t late[LINK_MAX_DATAGRAM_BYTES];
+    while (link_recv(link, late, sizeof late, link_now_ns(link)) >= 0) {
+    }
+}
+
+void torture_reset(struct torture *const t)
+{
+    memcpy(t->flash, t->before, t->size);
+    torture_power_up(t);
+}
+
+static int start_job(struct torture *const t, struct flash_card *const card, struct flash_job **const job)
+{
+    if (t->kind == TORTURE_RESTORE)
+        return flash_job_restore(job, card, t->wanted, t->size, &t->options, &t->diag);
+    return flash_job_write(job, card, &t->image, &t->options, &t->diag);
+}
+
+int torture_run(struct torture *const t)
+{
+    struct flash_card *card = NULL;
+    struct flash_job *job = NULL;
+    t->diag = (struct hm2_diag){0};
+    int err = flash_card_new(&card, sim_net_link(t->net), &t->diag);
+    if (err == 0)
+        err = start_job(t, card, &job);
+    if (err == 0)
+        err = flash_job_run(job, NULL, NULL, &t->diag);
+    flash_job_free(job);
+    flash_card_free(card);
+    return err;
+}
+
+static bool holds(const struct torture *const t, const uint8_t *const state, const enum sim_area area)
+{
+    const uint32_t start = start_of(t, area);
+    size_t room = t->size / 2 - (area == SIM_AREA_FALLBACK ? start : 0);
+    if (t->filler_at > start && t->filler_at - start < room)
+        room = t->filler_at - start;
+    return memcmp(t->flash + start, state + start, room) == 0;
+}
+
+void torture_check_starts(const struct torture *const t, const char *const what, const uint64_t number)
+{
+    const enum sim_boot boot = sim_card_would_boot(t->sim);
+    if (boot != SIM_BOOT_USER && boot != SIM_BOOT_FALLBACK)
+        fail_msg("%s, %s %" PRIu64 " of %" PRIu64 ": the card would start %s", t->profile, what, number, t->operations,
+                 sim_boot_name(boot));
+    const enum sim_area area = boot == SIM_BOOT_USER ? SIM_AREA_USER : SIM_AREA_FALLBACK;
+    if (!holds(t, t->before, area) && !holds(t, t->wanted, area))
+        fail_msg("%s, %s %" PRIu64 ": the image that starts is neither the old nor the new one", t->profile, what,
+                 number);
+    if (t->kind == TORTURE_WRITE_FALLBACK && boot != SIM_BOOT_USER)
+        fail_msg("%s, %s %" PRIu64 ": writing the fallback image cost the user image", t->profile, what, number);
+    if (!efinix(t) && memcmp(t->flash, t->before, FLASH_SECTOR_BYTES) != 0)
+        fail_msg("%s, %s %" PRIu64 ": the boot block's sector has changed", t->profile, what, number);
+}
+
+void torture_check_wanted(const struct torture *const t, const char *const what, const uint64_t number)
+{
+    for (size_t i = 0; i < t->size; i++)
+        if (t->flash[i] != t->wanted[i])
+            fail_msg("%s, %s %" PRIu64 ": byte 0x%06zX is 0x%02X instead of 0x%02X", t->profile, what, number, i,
+                     t->flash[i], t->wanted[i]);
+    if (sim_card_would_boot(t->sim) != SIM_BOOT_USER)
+        fail_msg("%s, %s %" PRIu64 ": the user image does not start", t->profile, what, number);
+}

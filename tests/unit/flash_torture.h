@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * A simulated card that is programmed again and again from the same state, in virtual time, while the power goes or the
+ * network is bad, and what must hold then: it starts the old, the new or the fallback image, whole, and a second run
+ * brings it to what was wanted.
+ */
+#ifndef FLASH_TORTURE_H
+#define FLASH_TORTURE_H
+
+#include <hm2/flash.h>
+#include <hm2/sim_flash.h>
+
+enum torture_kind { TORTURE_WRITE, TORTURE_WRITE_FALLBACK, TORTURE_RESTORE };
+
+struct torture {
+    enum torture_kind kind;
+    const char *profile;
+    struct sim_card *sim;
+    struct sim_net *net;
+    uint8_t *flash, *before, *wanted; /* whole chips */
+    size_t size;
+    uint8_t *file; /* that is written */
+    struct flash_image image;
+    uint32_t filler_at; /* behind the image to the end of its page: no part of it; 0 = none */
+    struct flash_options options;
+    struct hm2_diag diag;
+    uint64_t operations; /* that an undisturbed run takes */
+};
+
+/* late_bytes of the images differ from those that are there, 0 = everything does. */
+struct torture *torture_new(enum torture_kind kind, const char *profile, size_t late_bytes);
+void torture_free(struct torture *torture);
+
+/* As at the beginning, without faults. */
+void torture_reset(struct torture *torture);
+/* The command, from identification on; its result. */
+int torture_run(struct torture *torture);
+/* Off and on, faults mended. */
+void torture_power_up(struct torture *torture);
+/* Fails the test when the card would not start, or holds anything but images that it had or was to get. */
+void torture_check_starts(const struct torture *torture, const char *what, uint64_t number);
+/* Fails the test when the flash does not hold what was wanted. */
+void torture_check_wanted(const struct torture *torture, const char *what, uint64_t number);
+
+#endif

@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * The programmer while the power goes in the midst of page programs and erases, and while the network loses, repeats,
+ * delays and cuts datagrams. FLASH_TORTURE=N makes N times as many runs; from 5 on the power is cut in every page
+ * program and erase of images that differ in two sectors, and there are more than 2,000 runs of each kind.
+ */
+#include <inttypes.h>
+#include <limits.h>
+
+#include "flash_torture.h"
+#include "unit.h"
+
+#define LATE_BYTES 60000u /* so many bytes at the end of an image differ, and its beginning with them */
+#define CUTS       70u    /* of each scenario, at least */
+#define LOSSY_RUNS 70u
+
+static unsigned factor(void)
+{
+    const char *const text = getenv("FLASH_TORTURE");
+    const long value = text ? strtol(text, NULL, 10) : 1;
+    return value < 1 ? 1 : value > 1000 ? 1000 : (unsigned)value;
+}
+
+static const struct scenario {
+    const char *name;
+    enum torture_kind kind;
+    const char *profile;
+} scenarios[] = {
+    {"write", TORTURE_WRITE, "7i93"},
+    {"write", TORTURE_WRITE, "7i96s"},
+    {"fallback write", TORTURE_WRITE_FALLBACK, "7i93"},
+    {"fallback write", TORTURE_WRITE_FALLBACK, "7i96s"},
+    {"restore", TORTURE_RESTORE, "7i93"},
+    {"restore", TORTURE_RESTORE, "7i96s"},
+};
+
+/* The same command again, on a card that is well. */
+static void second_run(struct torture *const t, const char *const what, const uint64_t number)
+{
+    torture_power_up(t);
+    torture_check_starts(t, what, number);
+    if (torture_run(t) != 0)
+        fail_msg("%s, %s %" PRIu64 ", second run: %s", t->profile, what, number, t->diag.text);
+    torture_check_wanted(t, what, number);
+}
+
+static void cut_all(const struct scenario *const scenario)
+{
+    struct torture *const t = torture_new(scenario->kind, scenario->profile, LATE_BYTES);
+    const uint64_t cuts_wanted = (uint64_t)CUTS * factor();
+    const uint64_t step = t->operations <= cuts_wanted ? 1 : t->operations / cuts_wanted;
+    uint64_t cuts = 0;
+    for (uint64_t at = 1; at <= t->operations; at += at < 8 ? 1 : step, cuts++) {
+        torture_reset(t);
+        const struct sim_flash_faults faults = {.cut_at = at, .cut_bytes = (unsigned)(at * 37 % 257), .seed = at};
+        sim_card_flash_faults(t->sim, &faults);
+        if (torture_run(t) == 0)
+            fail_msg("%s, %s: cut %" PRIu64 " went unnoticed", t->profile, scenario->name, at);
+        second_run(t, scenario->name, at);
+    }
+    printf("%s, %s: %" PRIu64 " power cuts in %" PRIu64 " operations, seed = operation\n", t->profile, scenario->name,
+           cuts, t->operations);
+    torture_free(t);
+}
+
+static void the_power_may_go_at_any_moment(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof scenarios / sizeof scenarios[0]; i++)
+        cut_all(&scenarios[i]);
+}
+
+static void lose(const struct scenario *const scenario)
+{
+    struct torture *const t = torture_new(scenario->kind, scenario->profile, LATE_BYTES);
+    const unsigned runs = LOSSY_RUNS * factor();
+    unsigned failed = 0;
+    for (unsigned seed = 1; seed <= runs; seed++) {
+        torture_reset(t);
+        const double p = seed % 10 * 0.01;
+        const struct sim_faults faults = {.seed = seed,
+                                          .loss = p,
+                                          .duplicate = p / 2,
+                                          .reorder = seed % 3 * 0.01,
+                                          .truncate = seed % 4 * 0.005,
+                                          .delay_max_ns = seed % 5 * 1000000};
+        assert_int_equal(sim_net_set_faults(t->net, &faults), 0);
+        const int err = torture_run(t);
+        if (err == 0)
+            torture_check_wanted(t, scenario->name, seed);
+        else
+            second_run(t, scenario->name, seed);
+        failed += err != 0;
+    }
+    printf("%s, %s: %u lossy runs, seeds 1 to %u; %u of them did not come to the end at once\n", t->profile,
+           scenario->name, runs, runs, failed);
+    torture_free(t);
+}
+
+static void the_network_may_be_bad(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof scenarios / sizeof scenarios[0]; i++)
+        lose(&scenarios[i]);
+}
+
+static void bits_that_fail_now_and_then_are_written_again(void **state)
+{
+    (void)state;
+    struct torture *const t = torture_new(TORTURE_WRITE, "7i93", LATE_BYTES);
+    for (unsigned i = 0; i < 8; i++) {
+        torture_reset(t);
+        const uint32_t at = (uint32_t)t->size / 2 + (uint32_t)t->image.payload_bytes - 500 * i - 50;
+        const struct sim_flash_faults faults = {.bad_count = 1, .bad = {{at, 0xFF, i % 2, (i + 1) % 2}}};
+        sim_card_flash_faults(t->sim, &faults);
+        if (torture_run(t) != 0)
+            fail_msg("bit %u: %s", i, t->diag.text);
+        torture_check_wanted(t, "bad bit", i);
+    }
+    torture_free(t);
+}
+
+static void bits_that_always_fail_end_the_run_and_the_fallback_starts(void **state)
+{
+    (void)state;
+    struct torture *const t = torture_new(TORTURE_WRITE, "7i96s", LATE_BYTES);
+    torture_reset(t);
+    uint32_t at = (uint32_t)t->size / 2 + (uint32_t)t->image.payload_bytes - 2000;
+    while (t->wanted[at] == 0xFF || t->before[at] == t->wanted[at])
+        at++;
+    const struct sim_flash_faults faults = {.bad_count = 1, .bad = {{at, 0xFF, UINT_MAX, 0}}};
+    sim_card_flash_faults(t->sim, &faults);
+    assert_int_equal(torture_run(t), HM2_ERR_IO);
+    assert_int_equal(sim_card_would_boot(t->sim), SIM_BOOT_FALLBACK);
+    second_run(t, "worn", 0);
+    torture_free(t);
+}
+
+static void a_chip_that_never_ends_is_reported_in_time(void **state)
+{
+    (void)state;
+    struct torture *const t = torture_new(TORTURE_WRITE, "7i93", LATE_BYTES);
+    torture_reset(t);
+    const struct sim_flash_faults faults = {.stuck_at = 3};
+    sim_card_flash_faults(t->sim, &faults);
+    const int64_t before_ns = link_now_ns(sim_net_link(t->net));
+    assert_int_equal(torture_run(t), HM2_ERR_TIMEOUT);
+    const int64_t took_s = (link_now_ns(sim_net_link(t->net)) - before_ns) / 1000000000;
+    assert_in_range(took_s, 0, 60);
+    second_run(t, "stuck", 3);
+    torture_free(t);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_power_may_go_at_any_moment),
+        cmocka_unit_test(the_network_may_be_bad),
+        cmocka_unit_test(bits_that_fail_now_and_then_are_written_again),
+        cmocka_unit_test(bits_that_always_fail_end_the_run_and_the_fallback_starts),
+        cmocka_unit_test(a_chip_that_never_ends_is_reported_in_time),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
