@@ -10,6 +10,7 @@
 #define ID_WORDS       4u
 #define INFO_WORDS     (LBP16_INFO_BYTES / 2u)
 #define TIMER_SPACE_IN 3u /* first LBP16 version that has space 4 (flash tool reference 1.4.1) */
+#define FIRST_TRIES    5u /* 2.5 s */
 #define QUIET_NS       INT64_C(100000000)
 #define QUIET_ROUNDS   3u
 
@@ -80,7 +81,7 @@ static int read_first(struct flash_card *const card, struct hm2_diag *const diag
     (void)lbp16_add_read_hm2(&port->builder, HM2_ADDR_COOKIE, ID_WORDS, &id_at);
     for (unsigned i = 0; i < sizeof spaces / sizeof spaces[0]; i++)
         (void)lbp16_add_read_info(&port->builder, spaces[i], &area_at[i]);
-    const int err = flash_port_run(port, FLASH_WORK_READ, FLASH_TRIES);
+    const int err = flash_port_run(port, FLASH_WORK_READ, FIRST_TRIES);
     if (err < 0)
         return silent(diag);
     take_name(info, port->reply + name_at);
@@ -287,7 +288,7 @@ int flash_card_outputs(struct flash_card *const card, struct hm2_diag *const dia
         return 0;
     const struct hm2_md *const ports = hm2_idrom_find(&idrom, HM2_GTAG_IOPORT);
     for (unsigned i = 0; ports && i < ports->instances; i++) {
-        uint32_t word;
+        uint32_t word = 0;
         const int err = flash_card_read_hm2(card, hm2_md_address(ports, DDR, i), 1, &word, diag);
         if (err < 0)
             return err;
@@ -362,7 +363,7 @@ int flash_card_write_eeprom(struct flash_card *const card, const uint16_t addres
     enum { MOST = 16 };
     static const uint16_t key = 0x5A02;
     struct flash_port *const port = &card->port;
-    uint16_t back[MOST];
+    uint16_t back[MOST] = {0};
     if (count > MOST || address < LBP16_EEPROM_IP || address + 2u * count > LBP16_EEPROM_BYTES)
         return hm2_diag_add(diag, HM2_ERR_RANGE, "settings at 0x%02X to 0x%02X cannot be written", (unsigned)address,
                             (unsigned)(address + 2u * count));

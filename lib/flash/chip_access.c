@@ -162,7 +162,7 @@ int flash_read_some(struct flash_card *const card, const uint32_t address, uint8
 {
     struct flash_port *const port = &card->port;
     int err;
-    size_t at, len;
+    size_t at = 0, len;
     do {
         const size_t most = port->counters.bytes_per_read;
         len = *count < most ? *count : most;

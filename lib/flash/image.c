@@ -18,10 +18,19 @@ void flash_copy_text(char *const to, const uint8_t *const from, const size_t len
     to[count] = '\0';
 }
 
+static int hex_digit(const char c)
+{
+    if (c >= '0' && c <= '9')
+        return c - '0';
+    if (c >= 'a' && c <= 'f')
+        return c - 'a' + 10;
+    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+}
+
 static bool looks_like_hex(const uint8_t *const data)
 {
     for (unsigned i = 0; i < 2; i++)
-        if (!memchr("0123456789abcdefABCDEF", data[i], 22))
+        if (hex_digit((char)data[i]) < 0)
             return false;
     return data[2] == '\n' || data[2] == '\r';
 }
@@ -52,15 +61,6 @@ uint8_t flash_image_byte(const struct flash_image *const image, const size_t off
     if (offset >= FILLER_DISTANCE && offset - FILLER_DISTANCE < image->payload_bytes)
         return image->payload[offset - FILLER_DISTANCE];
     return FLASH_ERASED;
-}
-
-static int hex_digit(const char c)
-{
-    if (c >= '0' && c <= '9')
-        return c - '0';
-    if (c >= 'a' && c <= 'f')
-        return c - 'a' + 10;
-    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
 }
 
 int flash_side_file_parse(const char *const text, const size_t len, uint8_t hash[const FLASH_SHA256_BYTES],

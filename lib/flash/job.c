@@ -247,8 +247,9 @@ int flash_job_verify(struct flash_job **const job, struct flash_card *const card
 
 /* ---- whole chips ------------------------------------------------------------------------------------------------ */
 
-static int whole_chip(struct flash_job **const job, struct flash_card *const card, const enum job_kind kind,
-                      const uint8_t *const dump, const size_t len, struct hm2_diag *const diag)
+/* Compare the chip with `dump`, or read it `into` memory of the caller's. */
+static int whole_chip(struct flash_job **const job, struct flash_card *const card, const uint8_t *const dump,
+                      uint8_t *const into, const size_t len, struct hm2_diag *const diag)
 {
     const struct flash_chip *const chip = card->info.chip;
     *job = NULL;
@@ -257,32 +258,24 @@ static int whole_chip(struct flash_job **const job, struct flash_card *const car
                             card->info.card_name, (unsigned)card->info.flash_id & 0xFFu);
     if (len != chip->bytes)
         return hm2_diag_add(diag, HM2_ERR_RANGE, "%zu bytes, and the chip has %u", len, (unsigned)chip->bytes);
-    struct flash_job *const made = new_job(card, kind, NULL, diag);
+    struct flash_job *const made = new_job(card, into ? JOB_BACKUP : JOB_VERIFY, NULL, diag);
     if (!made)
         return HM2_ERR_NOMEM;
     add_pass(made, &(struct job_pass){.range = {0, chip->bytes}, .raw = dump, .bytes = chip->bytes});
-    *job = made;
-    return 0;
+    made->dump = into;
+    return begin(job, made, 0, into ? JOB_READ : JOB_COMPARE);
 }
 
 int flash_job_verify_dump(struct flash_job **const job, struct flash_card *const card, const uint8_t *const dump,
                           const size_t len, struct hm2_diag *const diag)
 {
-    const int err = whole_chip(job, card, JOB_VERIFY, dump, len, diag);
-    if (err == 0)
-        start(*job, JOB_COMPARE);
-    return err;
+    return whole_chip(job, card, dump, NULL, len, diag);
 }
 
 int flash_job_backup(struct flash_job **const job, struct flash_card *const card, uint8_t *const dump, const size_t len,
                      struct hm2_diag *const diag)
 {
-    const int err = whole_chip(job, card, JOB_BACKUP, dump, len, diag);
-    if (err < 0)
-        return err;
-    (*job)->dump = dump;
-    start(*job, JOB_READ);
-    return 0;
+    return whole_chip(job, card, NULL, dump, len, diag);
 }
 
 static void add_area(struct flash_job *const job, const uint8_t *const dump, const enum flash_area area)

@@ -14,7 +14,7 @@ static void require(const bool condition)
         abort();
 }
 
-static void require_text(const char *const text)
+static void require_text(const char *text)
 {
     require(memchr(text, '\0', FLASH_TEXT_BYTES) != NULL);
     for (; *text; text++)

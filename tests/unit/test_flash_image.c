@@ -120,7 +120,7 @@ static void refuses_other_kinds_of_files(void **state)
     (void)state;
     memset(file, 0xFF, 64);
     assert_int_equal(parse(64, &image, "raw .bin"), HM2_ERR_UNSUPPORTED);
-    memcpy(file, "56\n65\n72\n73\n69\n6F\n6E\n", 21);
+    memcpy(file, "56\n65\n72\n73\n69\n6F\n6E\n", sizeof "56\n65\n72\n73\n69\n6F\n6E\n");
     assert_int_equal(parse(21, &image, ".hex file"), HM2_ERR_UNSUPPORTED);
     memset(file, 0, 64);
     assert_int_equal(parse(64, &image, "neither a Xilinx .bit nor an Efinix .bin"), HM2_ERR_MALFORMED);
@@ -195,7 +195,7 @@ static void the_boot_block_leads_to_the_user_area(void **state)
     static const uint8_t banks[] = {0x01, 0x02, 0x04, 0x08, 0x10, 0x20};
     uint8_t page[2 * FLASH_PAGE_BYTES] = {0};
     (void)state;
-    for (uint8_t i = 0; i < sizeof banks; i++) {
+    for (unsigned i = 0; i < sizeof banks; i++) {
         const struct flash_chip *const chip = flash_chip_of_id((uint8_t)(0x10 + i));
         flash_boot_block(chip, page);
         assert_int_equal(page[25], banks[i]);

@@ -79,7 +79,7 @@ static int print_live(struct cli *const cli)
 {
     enum { TIMERS = 3, CONTROL = 13 };
     const struct flash_card_info *const info = cli->info;
-    uint16_t t[TIMERS] = {0}, c[CONTROL];
+    uint16_t t[TIMERS] = {0}, c[CONTROL] = {0};
     int err = 0;
     if (info->space[LBP16_SPACE_TIMER].cookie)
         err = flash_card_read16(cli->card, LBP16_SPACE_TIMER, 0, TIMERS, t, &cli->diag);
@@ -141,7 +141,8 @@ static int print_json(struct cli *const cli)
     json_text(cli, "eeprom_ip", text);
     snprintf(text, sizeof text, "%u.%u.%u.%u", info->netmask[0], info->netmask[1], info->netmask[2], info->netmask[3]);
     json_text(cli, "eeprom_netmask", text);
-    json_number(cli, "led_mode", info->eeprom[LBP16_EEPROM_LED_MODE / 2]);
+    const unsigned led_mode = info->eeprom[LBP16_EEPROM_LED_MODE / 2];
+    json_number(cli, "led_mode", led_mode);
     json_number(cli, "lbp16", info->lbp_version);
     json_number(cli, "firmware", info->firmware);
     json_text(cli, "jumpers", jumper_text(info));

@@ -57,6 +57,9 @@ static void announce(const struct cli *const cli, const uint8_t *const bytes, co
     sha256_text(bytes, len, hash);
     say(cli, "Board: %s at %s, MAC address %02X:%02X:%02X:%02X:%02X:%02X, %s area\nsha256: '%s'\n", card_name(cli),
         cli->address, m[0], m[1], m[2], m[3], m[4], m[5], area == FLASH_USER ? "user" : "fallback", hash);
+    if (strncmp(card_name(cli), "7I76E", 5) == 0)
+        say(cli, "This card has two flash chips; the one that jumper %s chooses now is written.\n",
+            strcmp(card_name(cli), "7I76EU") == 0 ? "W7" : "W9");
 }
 
 /* ---- running a job
@@ -155,7 +158,7 @@ static void boot_line(const struct cli *const cli, const struct flash_job *const
 
 static int write_job(struct cli *const cli, struct flash_job *const job)
 {
-    struct outcome outcome;
+    struct outcome outcome = {0};
     int status = make_plan(cli, job);
     if (status != DONE)
         return status;
@@ -227,7 +230,7 @@ int do_write(struct cli *const cli, const char *const arg)
 
 static int verify_job(struct cli *const cli, struct flash_job *const job, const char *const what)
 {
-    struct outcome outcome;
+    struct outcome outcome = {0};
     const int status = run(cli, job, &outcome);
     if (status != DONE)
         return status;
@@ -320,7 +323,7 @@ static int read_chip(struct cli *const cli, uint8_t *const dump, const size_t le
 int backup_to(struct cli *const cli, const char *const where)
 {
     const struct flash_chip *const chip = cli->info->chip;
-    struct outcome outcome;
+    struct outcome outcome = {0};
     char path[4096];
     if (!chip)
         return complain(cli, REFUSED, "Unknown size FLASH memory on the %s board", card_name(cli));
@@ -350,11 +353,34 @@ int do_backup(struct cli *const cli, const char *const arg)
     return status;
 }
 
+/* The side file that a backup of ours has beside it: the first line names the card (H13). */
+static int check_origin(struct cli *const cli, const char *const path)
+{
+    enum { MOST = 4096 };
+    static const char key[] = "card: ";
+    char side[4096];
+    size_t len;
+    snprintf(side, sizeof side, "%s.card", path);
+    uint8_t *const text = read_file(side, MOST, &len);
+    if (!text)
+        return DONE; /* mesaflash makes none */
+    int status = DONE;
+    text[len] = '\0';
+    text[strcspn((char *)text, "\r\n")] = '\0';
+    if (strncmp((char *)text, key, sizeof key - 1) == 0 && strcmp((char *)text + sizeof key - 1, card_name(cli)) != 0)
+        status = complain(cli, REFUSED, "the dump is from a %.32s and this card is a %s", (char *)text + sizeof key - 1,
+                          card_name(cli));
+    free(text);
+    return status;
+}
+
 static int restore_dump(struct cli *const cli, const char *const path, const uint8_t *const dump, const size_t len)
 {
     struct flash_job *job = NULL;
-    struct outcome outcome;
+    struct outcome outcome = {0};
     int status = check_side_file(cli, path, dump, len, true, "Backup file");
+    if (status == DONE)
+        status = check_origin(cli, path);
     if (status != DONE)
         return status;
     const struct flash_options options = options_of(cli, path);

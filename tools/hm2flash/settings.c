@@ -29,7 +29,7 @@ static bool number(const char *const text, const unsigned long most, unsigned lo
 int do_rpo(struct cli *const cli, const char *const arg)
 {
     unsigned long address;
-    uint32_t value;
+    uint32_t value = 0;
     if (!number(arg, REGISTERS - 4, &address) || address % 4)
         return complain(cli, USAGE, "--rpo %s: expected a register, 0x0000 to 0xFFFC, divisible by four", arg);
     const int err = flash_card_read_hm2(cli->card, (uint16_t)address, 1, &value, &cli->diag);

@@ -7,7 +7,7 @@
  *
  * Everything runs on a struct link and in its clock, so that it works in virtual time as well. Parsers and tables are
  * pure. Functions that talk to a card return after at most a few bounded tries; none is for a realtime thread. Only
- * flash_card_new() and flash_job_new() allocate. A card and its jobs are used by one thread at a time.
+ * flash_card_new() and the functions that make jobs allocate. A card and its jobs are used by one thread at a time.
  *
  * Errors: HM2_ERR_MISMATCH and HM2_ERR_STATE = refused, nothing was changed; HM2_ERR_TIMEOUT = the card was lost;
  * HM2_ERR_IO = the flash does not hold what was written; HM2_ERR_MALFORMED = the file or an answer breaks its format.
@@ -188,6 +188,20 @@ HM2_API int HM2_MUST_CHECK flash_card_survey(struct flash_card *card, struct fla
 HM2_API int HM2_MUST_CHECK flash_card_quiet(struct flash_card *card, struct hm2_diag *diag);
 /* Number of I/O pins that are outputs now (H19); negative = error. */
 HM2_API int HM2_MUST_CHECK flash_card_outputs(struct flash_card *card, struct hm2_diag *diag);
+
+/* What is at a smart-serial port. The port is reset and its pins are switched to it meanwhile: refuse before (see
+ * flash_card_quiet()) when a machine may run. HM2_ERR_NOTFOUND, without a sentence, when there is no such port. */
+#define FLASH_SSERIAL_CHANNELS 8u
+struct flash_sserial {
+    uint8_t type, width, major, minor, processor;
+    unsigned channels;
+    uint32_t baud;
+    bool present[FLASH_SSERIAL_CHANNELS]; /* a remote device answered */
+    uint32_t unit[FLASH_SSERIAL_CHANNELS];
+    char name[FLASH_SSERIAL_CHANNELS][5];
+};
+HM2_API int HM2_MUST_CHECK flash_card_sserial(struct flash_card *card, unsigned port, struct flash_sserial *out,
+                                              struct hm2_diag *diag);
 
 /* Any memory space of 16-bit items, and HostMot2's registers. */
 HM2_API int HM2_MUST_CHECK flash_card_read16(struct flash_card *card, enum lbp16_space space, uint16_t address,

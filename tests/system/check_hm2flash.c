@@ -1,0 +1,217 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* hm2flash as a program, on simulated cards over UDP: what it prints, does, refuses, and its exit status. */
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "flash_rig.h"
+#include "process.h"
+#include "simulator.h"
+
+#define RUN_MS   30000
+#define MAX_ARGS 20
+
+enum { DONE = 0, FAILED = 1, USAGE = 2, REFUSED = 3, LOST = 4 };
+
+static struct simulator sim;
+static struct process tool;
+
+/* Two cards: a 7I96S at address 0, a 7I93 at address 1. */
+static void set_up(void)
+{
+    static const char *const cards[] = {"--card", "7i96s", "--card", "7i93", NULL};
+    simulator_start(&sim, cards);
+}
+
+static void tear_down(void)
+{
+    simulator_stop(&sim);
+    flash_rig_clean();
+}
+
+/* Run with these arguments and expect this status; what it printed. */
+static const char *run_with(const int status, const char *const *const args)
+{
+    const char *argv[MAX_ARGS] = {process_built("hm2flash")};
+    for (unsigned n = 0; args[n]; n++) {
+        ck_assert_uint_lt(n + 2, MAX_ARGS);
+        argv[n + 1] = args[n];
+    }
+    const int got = process_run(&tool, argv, RUN_MS);
+    ck_assert_msg(got == status, "status %d instead of %d: %s", got, status, tool.text);
+    return tool.text;
+}
+#define run(status, ...) run_with(status, (const char *const[]){__VA_ARGS__, NULL})
+
+static void printed(const char *const words)
+{
+    ck_assert_msg(strstr(tool.text, words) != NULL, "\"%s\" was not printed: %s", words, tool.text);
+}
+
+static const char *image_7i96s(const uint64_t seed)
+{
+    return flash_rig_image("7i96s_test.bin", &(struct sim_flash_file){.profile = "7i96s", .seed = seed});
+}
+
+START_TEST(identifies_a_card)
+{
+    char line[64];
+    snprintf(line, sizeof line, "\nETH device 7I96S at ip=%s\n", sim.address[0]);
+    ck_assert_str_eq(run(DONE, "--device", "7i96s", "--addr", sim.address[0]), line);
+    ck_assert_str_eq(run(DONE, "-device", "ether", "-addr", sim.address[0]), line);
+    run(DONE, "--device", "ETHER", "--addr", sim.address[1], "--verbose");
+    printed("  FPGA type: 6slx9tqg144\n");
+    printed("  flash: sector 0: boot block, fallback area: Xilinx image, user area: blank\n");
+}
+END_TEST
+
+START_TEST(tells_what_is_wrong_by_its_exit_status)
+{
+    run(REFUSED, "--device", "7i96", "--addr", sim.address[0]);
+    printed("No 7I96 board found\n");
+    printed("is a 7I96S, not a 7I96");
+    run(USAGE, "--device", "7i99", "--addr", sim.address[0]);
+    printed("ERROR: Unsupported device 7I99\n");
+    run(USAGE, "--device", "7i96s");
+    printed("You must supply an IP address for Ethernet cards\nNo 7I96S board found\n");
+    run(LOST, "--device", "7i96s", "--addr", "127.255.255.254");
+    printed("No 7I96S board found\n");
+    printed("192.168.1.121");
+    run(REFUSED, "--info", "/nonexistent");
+    run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--rpo", "garbage");
+    run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--wpo", "0x1000");
+    run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--set", "ip=");
+    run(REFUSED, "--device", "7i96s", "--addr", sim.address[0], "--set", "ip=224.0.0.1");
+    run(REFUSED, "--device", "7i96s", "--addr", sim.address[0], "--expect-mac", "00:00:00:00:00:01");
+}
+END_TEST
+
+START_TEST(writes_verifies_and_starts_an_image)
+{
+    const char *const address = sim.address[0], *const image = image_7i96s(1);
+    run(DONE, "--device", "7i96s", "--addr", address, "--write", image, "--dry-run");
+    printed("Nothing was changed.");
+    run(FAILED, "--device", "7i96s", "--addr", address, "--verify", image);
+    printed("expected: 0xA but read: 0xFF\n");
+    run(DONE, "--device", "7i96s", "--addr", address, "--write", image, "--reload");
+    printed("  |WWWW");
+    printed("Board configuration verified successfully.\n");
+    printed("is back after");
+    printed("user image");
+    run(DONE, "--device", "7i96s", "--addr", address, "--verify", image);
+    run(DONE, "--device", "7i96s", "--addr", address, "--write", image, "--json");
+    printed("\"sectors_same\": 11, \"sectors_erased\": 0, \"pages_written\": 0");
+    ck_assert_str_eq(simulator_ask(&sim, "card 0 boots"), "runs user boots user");
+}
+END_TEST
+
+START_TEST(refuses_before_it_erases)
+{
+    const char *const address = sim.address[1];
+    run(REFUSED, "--device", "7i93", "--addr", address, "--write", image_7i96s(1));
+    printed("wrong bitfile destination device: T20F256, should be 6slx9tqg144");
+    const char *const other = flash_rig_image("7i92_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 2});
+    run(REFUSED, "--device", "7i93", "--addr", address, "--write", other);
+    printed("is for a 7I92");
+    run(REFUSED, "--device", "7i93", "--addr", address, "--write", other, "--override", "7I92");
+    run(REFUSED, "--device", "7i93", "--addr", address, "--write", other, "--sha256-check");
+    run(DONE, "--device", "7i93", "--addr", address, "--write", other, "--override", "7I93");
+}
+END_TEST
+
+START_TEST(backs_up_and_restores)
+{
+    const char *const address = sim.address[1], *const dump = flash_rig_path("dump.bin");
+    const char *const image = flash_rig_image("7i93_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 3});
+    run(DONE, "--device", "7i93", "--addr", address, "--backup-flash", dump);
+    printed("FLASH memory backup file '");
+    printed("Checksum file '");
+    run(REFUSED, "--device", "7i93", "--addr", address, "--backup-flash", dump);
+    printed("already exist");
+    run(DONE, "--device", "7i93", "--addr", address, "--write", image);
+    run(DONE, "--device", "7i93", "--addr", address, "--restore-flash", dump);
+    printed("Backup file integrity verification passed\n");
+    run(DONE, "--device", "7i93", "--addr", address, "--verify", dump);
+    run(REFUSED, "--device", "7i96s", "--addr", sim.address[0], "--restore-flash", dump);
+    printed("the dump is from a 7I93");
+    ck_assert_int_eq(truncate(dump, 100), 0);
+    run(REFUSED, "--device", "7i93", "--addr", address, "--restore-flash", dump);
+    printed("integrity verification not passed\n");
+}
+END_TEST
+
+START_TEST(sets_and_reads_settings_and_registers)
+{
+    const char *const address = sim.address[0];
+    run(DONE, "--device", "7i96s", "--addr", address, "--set", "ip=192.168.5.7");
+    printed("Board IP updated successfully.\n");
+    printed("You must power cycle board to load updated eeprom settings.\n");
+    printed("warning: the card does not take its address from the EEPROM");
+    run(DONE, "--device", "7i96s", "--addr", address, "--set", "netmask=255.255.0.0");
+    run(REFUSED, "--device", "7i96s", "--addr", address, "--set", "netmask=255.0.255.0");
+    run(DONE, "--device", "7i96s", "--addr", address, "--set", "ledmode=1");
+    run(DONE, "--device", "7i96s", "--addr", address, "--json");
+    printed("\"eeprom_ip\": \"192.168.5.7\", \"eeprom_netmask\": \"255.255.0.0\", \"led_mode\": 1");
+    ck_assert_str_eq(run(DONE, "--device", "7i96s", "--addr", address, "--rpo", "0x100"), "55AACAFE\n");
+    run(DONE, "--device", "7i96s", "--addr", address, "--wpo", "0x1100=0x21");
+    ck_assert_uint_eq(simulator_read(&sim, 0, 0x1100), 0x21);
+    run(REFUSED, "--device", "7i96s", "--addr", address, "--reload");
+    printed("2 pins of the card are outputs");
+    run(DONE, "--device", "7i96s", "--addr", address, "--safe-io");
+    run(DONE, "--device", "7i96s", "--addr", address, "--reset");
+    printed("is back after");
+}
+END_TEST
+
+START_TEST(works_on_many_cards_and_finds_them)
+{
+    char both[40], line[96];
+    snprintf(both, sizeof both, "%s,%s", sim.address[0], sim.address[1]);
+    run(DONE, "--device", "ether", "--addr", both);
+    for (unsigned i = 0; i < 2; i++) {
+        snprintf(line, sizeof line, "%s: ETH device %s at ip=%s\n", sim.address[i], i ? "7I93" : "7I96S",
+                 sim.address[i]);
+        printed(line);
+    }
+    run(REFUSED, "--device", "7i93", "--addr", both); /* one of them is */
+    run(DONE, "--discover", "--addr", both);
+    printed("7I96S");
+    printed("fallback: Xilinx image, user: blank");
+    run(LOST, "--discover", "--addr", "127.255.255.254");
+}
+END_TEST
+
+START_TEST(goes_by_the_name_of_mesaflash_too)
+{
+    const char *const link = flash_rig_path("mesaflash");
+    const char *const argv[] = {link, "--version", NULL};
+    ck_assert_int_eq(symlink(process_built("hm2flash"), link), 0);
+    ck_assert_int_eq(process_run(&tool, argv, RUN_MS), 0);
+    ck_assert_str_eq(strncmp(tool.text, "Mesaflash version 3.5.16", 24) == 0 ? "" : tool.text, "");
+}
+END_TEST
+
+int main(void)
+{
+    Suite *const suite = suite_create("hm2flash");
+    TCase *const tests = tcase_create("programs");
+    tcase_add_checked_fixture(tests, set_up, tear_down);
+    tcase_set_timeout(tests, 60);
+    tcase_add_test(tests, identifies_a_card);
+    tcase_add_test(tests, tells_what_is_wrong_by_its_exit_status);
+    tcase_add_test(tests, writes_verifies_and_starts_an_image);
+    tcase_add_test(tests, refuses_before_it_erases);
+    tcase_add_test(tests, backs_up_and_restores);
+    tcase_add_test(tests, sets_and_reads_settings_and_registers);
+    tcase_add_test(tests, works_on_many_cards_and_finds_them);
+    tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
+    suite_add_tcase(suite, tests);
+    SRunner *const runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    const int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+}
