@@ -148,7 +148,9 @@ static int start_board(struct ppmc *const ppmc, struct ppmc_board *const board, 
         {PPMC_W_PRESET, 0},
         {PPMC_W_FILTER, board->filter},
     };
-    const int err = ppmc_write_registers(ppmc, board, writes, COUNT(writes) - (board->sets_filter ? 0 : 1));
+    const int err = ppmc->keep_counts
+                        ? ppmc_restore(ppmc, board)
+                        : ppmc_write_registers(ppmc, board, writes, COUNT(writes) - (board->sets_filter ? 0 : 1));
     if (err)
         return hm2_diag_add(diag, err, "Slot %u: the %s does not take its settings: %s.", board->slot, board->info.name,
                             hm2_strerror(err));
@@ -278,6 +280,7 @@ int ppmc_setup(struct ppmc *const ppmc, struct epp *const epp, struct hm2_binder
 {
     ppmc->epp = epp;
     ppmc->bus = options->bus;
+    ppmc->keep_counts = options->keep_counts;
     int err = ppmc_scan(epp, ppmc->infos, diag);
     if (err == 0)
         err = check_options(ppmc, options, diag);
