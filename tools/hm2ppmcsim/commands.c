@@ -150,8 +150,8 @@ static bool show(struct sim_ppmc *const bus, const struct words *const w)
     const struct sim_ppmc_truth t = sim_ppmc_truth(bus, slot, axis);
     snprintf(w->answer, w->size,
              "shaft %" PRId64 " counted %" PRId64 " latched %" PRId64 " indices %" PRIu64 " presets %" PRIu64
-             " illegal %" PRIu64,
-             t.shaft, t.counted, t.held_counted, t.indices, t.presets, t.illegal);
+             " preset-at %" PRId64 " illegal %" PRIu64,
+             t.shaft, t.counted, t.held_counted, t.indices, t.presets, t.preset_at, t.illegal);
     return true;
 }
 
