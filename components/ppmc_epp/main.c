@@ -7,10 +7,7 @@
  * HAL glue only: everything about boards is in libhm2. Names and module parameters are those of LinuxCNC's hal_ppmc.
  */
 #include <errno.h>
-#include <pthread.h>
-#include <signal.h>
 #include <stdatomic.h>
-#include <string.h>
 #include <time.h>
 
 #include <hal.h>
@@ -20,6 +17,7 @@
 #include <hm2/ppmc.h>
 
 #include "common/hal_binder.h"
+#include "common/messenger.h"
 
 MODULE_AUTHOR("libhm2 developers");
 MODULE_DESCRIPTION("Pico Systems encoder counters on EPP");
@@ -127,13 +125,6 @@ static int export_function(const unsigned number, const char *const what, void (
 
 /* ---- messages: formatted and printed outside the realtime threads ------------------------------------------------ */
 
-#define MESSAGE_POLL_NS       100000000L
-#define MESSENGER_STACK_BYTES (256 << 10)
-
-static pthread_t messenger;
-static bool messenger_runs;
-static atomic_bool messenger_ends;
-
 static void print_messages(void)
 {
     char text[512];
@@ -141,59 +132,6 @@ static void print_messages(void)
     for (unsigned i = 0; i < bus_count; i++)
         for (unsigned n = 0; n < 32 && ppmc_next_message(buses[i].ppmc, text, sizeof text, &error) == 1; n++)
             rtapi_print_msg(error ? RTAPI_MSG_ERR : RTAPI_MSG_WARN, "ppmc_epp: %s\n", text);
-}
-
-static void *messenger_main(void *const unused)
-{
-    const struct timespec pause = {.tv_nsec = MESSAGE_POLL_NS};
-    (void)unused;
-    while (!atomic_load(&messenger_ends)) {
-        print_messages();
-        nanosleep(&pause, NULL);
-    }
-    return NULL;
-}
-
-/* A thread of normal priority, whatever the loader has, with a small stack (hosts lock their memory) and no signals. */
-static int create_messenger(void)
-{
-    const struct sched_param normal = {.sched_priority = 0};
-    pthread_attr_t attributes;
-    sigset_t all, before;
-    int result = pthread_attr_init(&attributes);
-    if (result != 0)
-        return result;
-    (void)pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-    (void)pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
-    (void)pthread_attr_setschedparam(&attributes, &normal);
-    (void)pthread_attr_setstacksize(&attributes, (size_t)MESSENGER_STACK_BYTES);
-    (void)sigfillset(&all);
-    (void)pthread_sigmask(SIG_SETMASK, &all, &before);
-    result = pthread_create(&messenger, &attributes, messenger_main, NULL);
-    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
-    (void)pthread_attr_destroy(&attributes);
-    return result;
-}
-
-static int start_messenger(void)
-{
-    atomic_store(&messenger_ends, false);
-    const int result = create_messenger();
-    if (result != 0) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "ppmc_epp: no thread for messages: %s\n", strerror(result));
-        return -result;
-    }
-    messenger_runs = true;
-    return 0;
-}
-
-static void stop_messenger(void)
-{
-    if (!messenger_runs)
-        return;
-    atomic_store(&messenger_ends, true);
-    pthread_join(messenger, NULL);
-    messenger_runs = false;
 }
 
 /* ---- module parameters ------------------------------------------------------------------------------------------- */
@@ -273,24 +211,6 @@ static void name_bus(const unsigned number, char *const name, const size_t size)
 
 /* ---- load and unload --------------------------------------------------------------------------------------------- */
 
-#define MAX_LINE 1000
-
-/* motmod, once loaded, takes the formats of error messages apart itself and knows no '*': lines are cut here. Warnings
- * are printed without a level: whoever loads a bus shall see them, but they are no errors on the operator's screen. */
-static void print_diag(const char *const name, const struct hm2_diag *const diag)
-{
-    char line[MAX_LINE];
-    for (const char *text = diag->text; *text;) {
-        const size_t len = strcspn(text, "\n");
-        rtapi_snprintf(line, sizeof line, "%.*s", (int)len, text);
-        if (strncmp(line, "warning: ", 9) == 0)
-            rtapi_print("ppmc_epp: %s: %s\n", name, line);
-        else
-            rtapi_print_msg(RTAPI_MSG_ERR, "ppmc_epp: %s: %s\n", name, line);
-        text += len + (text[len] == '\n');
-    }
-}
-
 static int bring_up(struct bus *const b, const char *const name, const struct ppmc_options *const options,
                     struct hm2_diag *const diag)
 {
@@ -316,7 +236,7 @@ static int load_bus(const unsigned number, const char *const name)
     atomic_store(&b->busy, false);
     bus_count++;
     const int err = bring_up(b, name, &options, &diag);
-    print_diag(name, &diag);
+    messenger_print_diag("ppmc_epp", name, &diag);
     if (err != HM2_OK) {
         rtapi_print_msg(RTAPI_MSG_ERR, "ppmc_epp: %s: not loaded: %s\n", name, hm2_strerror(err));
         return -EINVAL;
@@ -346,7 +266,7 @@ static int load_buses(void)
 static void unload_buses(void)
 {
     close_functions();
-    stop_messenger();
+    messenger_stop();
     print_messages();
     for (unsigned i = 0; i < bus_count; i++)
         ppmc_stop(buses[i].ppmc);
@@ -365,7 +285,7 @@ int rtapi_app_main(void)
     atomic_store(&closing, false);
     int result = load_buses();
     if (result == 0)
-        result = start_messenger();
+        result = messenger_start("ppmc_epp", print_messages);
     if (result == 0)
         result = hal_ready(component_id);
     if (result < 0)

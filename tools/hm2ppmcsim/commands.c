@@ -28,12 +28,27 @@ static bool number(const char *const text, const long min, const long max, long 
     return end != text && *end == '\0' && *value >= min && *value <= max;
 }
 
+static bool decimal(const char *const text, const long max, long *const value)
+{
+    char *end;
+    *value = strtol(text, &end, 10);
+    return *text >= '0' && *text <= '9' && *end == '\0' && *value <= max;
+}
+
 /* "SLOT.AXIS" */
 static bool read_axis(const char *const text, unsigned *const slot, unsigned *const axis)
 {
-    int len = 0;
-    return sscanf(text, "%2u.%1u%n", slot, axis, &len) == 2 && text[len] == '\0' && *slot < SIM_PPMC_SLOTS &&
-           *axis < SIM_PPMC_AXES;
+    const char *const dot = strchr(text, '.');
+    char first[3] = "";
+    long s, a;
+    if (!dot || dot == text || (size_t)(dot - text) >= sizeof first)
+        return false;
+    memcpy(first, text, (size_t)(dot - text));
+    if (!decimal(first, SIM_PPMC_SLOTS - 1, &s) || !decimal(dot + 1, SIM_PPMC_AXES - 1, &a))
+        return false;
+    *slot = (unsigned)s;
+    *axis = (unsigned)a;
+    return true;
 }
 
 static bool on_off(const char *const text, bool *const on)
