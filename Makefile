@@ -234,7 +234,7 @@ $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPE
 		-lpthread
 
 # These run drivers in their process, which find HAL, RTAPI and the C library's sockets there.
-$(BUILDDIR)/system/check_dropin_behaviour $(BUILDDIR)/system/check_dropin_loads: \
+$(BUILDDIR)/system/check_dropin_behaviour $(BUILDDIR)/system/check_dropin_loads $(BUILDDIR)/system/check_dropin_ppmc: \
 $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPERS) \
 	$(wildcard tests/system/dropin/*.c)) $(SIM_A) $(HOST_A) $(LIB_A) | $(COMPONENT_SO)
 	@mkdir -p $(@D)

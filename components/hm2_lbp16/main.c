@@ -8,8 +8,6 @@
  * hm2_eth together, so that a HAL file needs no change but this line.
  */
 #include <errno.h>
-#include <pthread.h>
-#include <signal.h>
 #include <stdatomic.h>
 #include <string.h>
 #include <time.h>
@@ -22,6 +20,7 @@
 #include <hm2/link.h>
 
 #include "common/hal_binder.h"
+#include "common/messenger.h"
 #include "flight_files.h"
 #include "isolation.h"
 
@@ -195,13 +194,6 @@ static int export_functions(struct card *const card)
 
 /* ---- messages: formatted and printed outside the realtime threads ------------------------------------------------ */
 
-#define MESSAGE_POLL_NS       100000000L
-#define MESSENGER_STACK_BYTES (256 << 10)
-
-static pthread_t messenger;
-static bool messenger_runs;
-static atomic_bool messenger_ends;
-
 static void print_messages(void)
 {
     char text[1024];
@@ -219,103 +211,25 @@ static void write_flights(void)
             rtapi_print("hm2_lbp16: %s\n", text);
 }
 
-static void *messenger_main(void *const unused)
+static void look_after_cards(void)
 {
-    const struct timespec pause = {.tv_nsec = MESSAGE_POLL_NS};
-    (void)unused;
-    while (!atomic_load(&messenger_ends)) {
-        print_messages();
-        write_flights();
-        nanosleep(&pause, NULL);
-    }
-    return NULL;
-}
-
-/* A thread of normal priority, whatever the loader has, with a small stack (hosts lock their memory) and no signals. */
-static int create_messenger(void)
-{
-    const struct sched_param normal = {.sched_priority = 0};
-    pthread_attr_t attributes;
-    sigset_t all, before;
-    int result = pthread_attr_init(&attributes);
-    if (result != 0)
-        return result;
-    (void)pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-    (void)pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
-    (void)pthread_attr_setschedparam(&attributes, &normal);
-    (void)pthread_attr_setstacksize(&attributes, (size_t)MESSENGER_STACK_BYTES);
-    (void)sigfillset(&all);
-    (void)pthread_sigmask(SIG_SETMASK, &all, &before);
-    result = pthread_create(&messenger, &attributes, messenger_main, NULL);
-    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
-    (void)pthread_attr_destroy(&attributes);
-    return result;
-}
-
-static int start_messenger(void)
-{
-    atomic_store(&messenger_ends, false);
-    const int result = create_messenger();
-    if (result != 0) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: no thread for messages: %s\n", strerror(result));
-        return -result;
-    }
-    messenger_runs = true;
-    return 0;
-}
-
-static void stop_messenger(void)
-{
-    if (!messenger_runs)
-        return;
-    atomic_store(&messenger_ends, true);
-    pthread_join(messenger, NULL);
-    messenger_runs = false;
-}
-
-/* ---- texts of several lines ----
- * motmod, once loaded, takes the formats of error messages apart itself and knows no '*': it would take the length in
- * "%.*s" for the string. */
-
-#define MAX_LINE 1000
-
-/* Copy the next line of a text without its end, cut when it is very long; false at the end of the text. */
-static bool next_line(const char **const text, char line[const MAX_LINE])
-{
-    const size_t len = strcspn(*text, "\n");
-    if (**text == '\0')
-        return false;
-    rtapi_snprintf(line, MAX_LINE, "%.*s", (int)len, *text);
-    *text += len + ((*text)[len] == '\n');
-    return true;
+    print_messages();
+    write_flights();
 }
 
 /* ---- load and unload --------------------------------------------------------------------------------------------- */
-
-/* Warnings are printed without a level: whoever loads a card shall see them, as hosts do not show the level of
- * warnings, but LinuxCNC puts every error on the operator's screen, and at every start these are none. */
-static void print_diag(const char *const subject, const struct hm2_diag *const diag)
-{
-    const char *text = diag->text;
-    char line[MAX_LINE];
-    while (next_line(&text, line))
-        if (strncmp(line, "warning: ", 9) == 0)
-            rtapi_print("hm2_lbp16: %s: %s\n", subject, line);
-        else
-            rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: %s: %s\n", subject, line);
-}
 
 static void print_listing(const struct card *const card)
 {
     static char text[16384];
     const char *rest = text;
-    char line[MAX_LINE];
+    char line[MESSENGER_LINE];
     const struct hm2_plan_sizes sizes = hm2_board_sizes(card->board);
     hm2_board_describe_pins(card->board, text, sizeof text);
     rtapi_print("%s: payload of a cycle: request %u, reply %u, write %u bytes; set-up up to %u bytes in %u sections\n",
                 hm2_board_prefix(card->board), (unsigned)sizes.request_bytes, (unsigned)sizes.reply_bytes,
                 (unsigned)sizes.write_bytes, (unsigned)sizes.setup_bytes, sizes.sections);
-    while (next_line(&rest, line))
+    while (messenger_next_line(&rest, line))
         rtapi_print("%s\n", line);
 }
 
@@ -384,7 +298,7 @@ static int load_card(const char *const address, const char *const configuration)
     card_count++;
     const int err = bring_up(card, address, configuration, &diag);
     rtapi_snprintf(subject, sizeof subject, "card %s", address);
-    print_diag(subject, &diag);
+    messenger_print_diag("hm2_lbp16", subject, &diag);
     if (err != HM2_OK) {
         rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: card %s: not loaded: %s\n", address, hm2_strerror(err));
         return -EINVAL;
@@ -479,7 +393,7 @@ static void isolate(const unsigned count, const enum isolation_mode mode)
     for (unsigned i = 0; i < count; i++)
         addresses[i] = board_ip[i];
     isolation_begin(&isolation, addresses, count, mode, &diag);
-    print_diag("network", &diag);
+    messenger_print_diag("hm2_lbp16", "network", &diag);
 }
 
 static int load_cards(void)
@@ -510,9 +424,8 @@ static void unload_cards(void)
     close_functions();
     for (unsigned i = 0; i < card_count; i++)
         hm2_board_stop(cards[i].board);
-    stop_messenger();
-    print_messages();
-    write_flights();
+    messenger_stop();
+    look_after_cards();
     hal_exit(component_id);
     isolation_end(&isolation);
     for (unsigned i = 0; i < card_count; i++)
@@ -529,7 +442,7 @@ int rtapi_app_main(void)
     atomic_store(&closing, false);
     int result = load_cards();
     if (result == 0)
-        result = start_messenger();
+        result = messenger_start("hm2_lbp16", look_after_cards);
     if (result == 0)
         result = hal_ready(component_id);
     if (result < 0)

@@ -57,7 +57,7 @@ int epp_open(struct epp **const epp, const char *const name, const bool reverse,
     if (strncmp(name, "port:", 5) == 0)
         return open_port(epp, name, reverse, diag);
     if (strncmp(name, "sim:", 4) == 0)
-        return epp_socket_open(epp, name + 4, diag);
+        return epp_socket_open(epp, name + 4, EPP_SOCKET_WAIT_NS, diag);
     return hm2_diag_add(diag, HM2_ERR_INVALID,
                         "Bus \"%.64s\": expected /dev/parportN, port:0xBASE or sim:SOCKET, for example /dev/parport0.",
                         name);

@@ -17,6 +17,7 @@
 struct bus_socket {
     struct epp base;
     int fd;
+    int64_t wait_ns; /* for a reply */
     uint16_t number; /* of the last request */
     uint8_t message[EPP_WIRE_MAX_BYTES];
 };
@@ -77,10 +78,11 @@ static int take_reply(const struct bus_socket *const bus, const size_t len, cons
 /* Length of the reply to the last request; older ones, which came too late for theirs, are passed over. */
 static ssize_t receive(struct bus_socket *const bus)
 {
-    const int64_t end_ns = epp_monotonic_ns(&bus->base) + EPP_SOCKET_WAIT_NS;
+    const int64_t end_ns = epp_monotonic_ns(&bus->base) + bus->wait_ns;
     for (;;) {
         const int64_t left_ns = end_ns - epp_monotonic_ns(&bus->base);
-        const struct timespec wait = {.tv_nsec = (long)(left_ns > 0 ? left_ns : 0)};
+        const int64_t wait_ns = left_ns > 0 ? left_ns : 0;
+        const struct timespec wait = {(time_t)(wait_ns / NS_PER_S), (long)(wait_ns % NS_PER_S)};
         struct pollfd ready = {.fd = bus->fd, .events = POLLIN};
         const int events = ppoll(&ready, 1, &wait, NULL);
         if (events == 0 || (events < 0 && errno != EINTR))
@@ -137,7 +139,7 @@ static int connect_to(struct bus_socket *const bus, const char *const path, stru
     return 0;
 }
 
-int epp_socket_open(struct epp **const epp, const char *const path, struct hm2_diag *const diag)
+int epp_socket_open(struct epp **const epp, const char *const path, const int64_t wait_ns, struct hm2_diag *const diag)
 {
     static const struct epp_ops ops = {.run = socket_run, .now_ns = epp_monotonic_ns, .close = socket_close};
     struct bus_socket *const bus = calloc(1, sizeof *bus);
@@ -145,6 +147,7 @@ int epp_socket_open(struct epp **const epp, const char *const path, struct hm2_d
         return hm2_diag_add(diag, HM2_ERR_NOMEM, "No memory for a simulated bus.");
     bus->base.ops = &ops;
     bus->fd = -1;
+    bus->wait_ns = wait_ns;
     const int err = connect_to(bus, path, diag);
     if (err) {
         socket_close(&bus->base);

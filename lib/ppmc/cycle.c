@@ -229,7 +229,8 @@ static void take(struct ppmc_board *const board, const struct ppmc_judgement *co
             board->encoders[i].stamp.valid = false;
     for (unsigned i = 0; i < PPMC_AXES; i++) {
         const struct ppmc_time time = time_of(board, i, period_ns);
-        ppmc_encoder_take(&board->encoders[i], &judgements[i], (board->sense | board->sense_new) >> i & 1u, &time);
+        ppmc_encoder_take(&board->encoders[i], &judgements[i], ((unsigned)board->sense | board->sense_new) >> i & 1u,
+                          &time);
     }
 }
 
@@ -339,7 +340,7 @@ static void write_preset(struct ppmc *const ppmc, struct ppmc_board *const board
     if (err)
         return; /* it is written anew in the next period */
     for (unsigned i = 0; i < PPMC_AXES; i++)
-        board->encoders[i].armed = board->preset >> i & 1u;
+        board->encoders[i].armed = ((unsigned)board->preset >> i & 1u) != 0;
 }
 
 static bool is_index_done(const struct ppmc_board *const board)

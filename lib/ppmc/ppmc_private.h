@@ -85,6 +85,7 @@ struct ppmc_bus_pins {
 struct ppmc {
     struct epp *epp;
     unsigned bus;
+    bool keep_counts;
     struct ppmc_board_info infos[PPMC_SLOTS];
     unsigned board_count;
     struct ppmc_board boards[PPMC_SLOTS];

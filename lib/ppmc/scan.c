@@ -139,3 +139,20 @@ int ppmc_set_filter(struct epp *const epp, const unsigned slot, const enum ppmc_
     err = epp_run(epp, steps, sizeof steps / sizeof steps[0], &done);
     return err ? hm2_diag_add(diag, err, "Slot %u: the filter rate was not written: %s.", slot, hm2_strerror(err)) : 0;
 }
+
+int ppmc_read_registers(struct epp *const epp, const unsigned slot, const unsigned offset, uint8_t *const bytes,
+                        const unsigned count, struct hm2_diag *const diag)
+{
+    const unsigned end = slot % 2 == 0 ? 2 * PPMC_SLOT_ADDRESSES : PPMC_SLOT_ADDRESSES;
+    if (slot >= PPMC_SLOTS || offset >= end || count == 0 || count > end - offset)
+        return hm2_diag_add(diag, HM2_ERR_RANGE,
+                            "Slot %u, registers %u to %u: slots are 0 to 15, registers of this one 0 to %u.", slot,
+                            offset, offset + count - 1, end - 1);
+    uint8_t address = (uint8_t)(slot * PPMC_SLOT_ADDRESSES + offset);
+    const struct epp_step steps[] = {{EPP_ADDRESS_WRITE, 1, &address}, {EPP_DATA_READ, (uint8_t)count, bytes}};
+    struct epp_done done;
+    const int err = epp_run(epp, steps, sizeof steps / sizeof steps[0], &done);
+    return err ? hm2_diag_add(diag, err, "Slot %u, register %u: %s.", slot, offset + (unsigned)done.bytes,
+                              hm2_strerror(err))
+               : 0;
+}

@@ -7,7 +7,6 @@
 
 #define FASTEST_HZ 10e6 /* of the filter's four rates: what holds when nobody set one */
 #define HZ_PER_MHZ 1e6
-#define TRIES      2u
 
 #define ENC(field, name, type, dir, init, unit, help) \
     HM2_POINT(struct ppmc_encoder, field, name, type, dir, init, unit, help)
@@ -96,42 +95,6 @@ const struct ppmc_board_info *ppmc_boards(const struct ppmc *const ppmc)
 
 /* ---- registers --------------------------------------------------------------------------------------------------- */
 
-static int write_register(struct ppmc *const ppmc, const struct ppmc_board *const board,
-                          const struct ppmc_write *const write)
-{
-    uint8_t address = (uint8_t)(board->base + write->offset), value = write->value;
-    const struct epp_step steps[] = {{EPP_ADDRESS_WRITE, 1, &address}, {EPP_DATA_WRITE, 1, &value}};
-    int err = HM2_ERR_TIMEOUT;
-    for (unsigned i = 0; err != 0 && i < TRIES; i++) {
-        struct epp_done done;
-        err = epp_run(ppmc->epp, steps, COUNT(steps), &done);
-        if (err)
-            ppmc_count_error(ppmc, err);
-    }
-    return err;
-}
-
-int ppmc_write_registers(struct ppmc *const ppmc, const struct ppmc_board *const board,
-                         const struct ppmc_write *const writes, const size_t count)
-{
-    int err = 0;
-    for (size_t i = 0; err == 0 && i < count; i++)
-        err = write_register(ppmc, board, &writes[i]);
-    return err;
-}
-
-int ppmc_restore(struct ppmc *const ppmc, struct ppmc_board *const board)
-{
-    const struct ppmc_write writes[] = {
-        {PPMC_W_CONTROL, 0}, {PPMC_W_ASSEMBLY, 0},           {PPMC_W_ASSEMBLY + 1, 0},       {PPMC_W_ASSEMBLY + 2, 0},
-        {PPMC_W_TIMER, 0},   {PPMC_W_PRESET, board->preset}, {PPMC_W_FILTER, board->filter},
-    };
-    size_t count = COUNT(writes);
-    if (!board->sets_filter)
-        count--;
-    return ppmc_write_registers(ppmc, board, writes, count);
-}
-
 /* Counts 0 through the load path, which needs 2 us: the writes in between take longer. */
 static int start_board(struct ppmc *const ppmc, struct ppmc_board *const board, struct hm2_diag *const diag)
 {
@@ -148,7 +111,9 @@ static int start_board(struct ppmc *const ppmc, struct ppmc_board *const board, 
         {PPMC_W_PRESET, 0},
         {PPMC_W_FILTER, board->filter},
     };
-    const int err = ppmc_write_registers(ppmc, board, writes, COUNT(writes) - (board->sets_filter ? 0 : 1));
+    const int err = ppmc->keep_counts
+                        ? ppmc_restore(ppmc, board)
+                        : ppmc_write_registers(ppmc, board, writes, COUNT(writes) - (board->sets_filter ? 0 : 1));
     if (err)
         return hm2_diag_add(diag, err, "Slot %u: the %s does not take its settings: %s.", board->slot, board->info.name,
                             hm2_strerror(err));
@@ -278,6 +243,7 @@ int ppmc_setup(struct ppmc *const ppmc, struct epp *const epp, struct hm2_binder
 {
     ppmc->epp = epp;
     ppmc->bus = options->bus;
+    ppmc->keep_counts = options->keep_counts;
     int err = ppmc_scan(epp, ppmc->infos, diag);
     if (err == 0)
         err = check_options(ppmc, options, diag);

@@ -141,7 +141,7 @@ static void load(struct ppmc_board *const board)
     if (board->options->strict && board->now_ns - board->load_since_ns < STRICT_LOAD_NS)
         return;
     for (unsigned i = 0; i < SIM_PPMC_AXES; i++)
-        if (board->registers.control >> (4 + i) & 1u)
+        if ((unsigned)board->registers.control >> (4 + i) & 1u)
             board->axes[i].counter = board->registers.assembly;
 }
 

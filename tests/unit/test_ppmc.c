@@ -12,6 +12,13 @@
 #define FAULTS_ON_READS (1u << SIM_PPMC_FAULT_ZEROS | 1u << SIM_PPMC_FAULT_ONES | 1u << SIM_PPMC_FAULT_RESIDUE)
 #define ALL_FAULTS      ((1u << SIM_PPMC_FAULTS) - 1u)
 
+/* Sanitizers make it slow, and see every line after a few. */
+#ifdef __SANITIZE_ADDRESS__
+#define TOTAL_CYCLES 100000
+#else
+#define TOTAL_CYCLES 1000000
+#endif
+
 struct rig {
     struct sim_ppmc *bus;
     struct ppmc *ppmc;
@@ -330,7 +337,7 @@ static int32_t rate_of(const unsigned phase, const unsigned encoder)
 static void a_million_cycles_at_all_rates_miss_no_count(void **state)
 {
     (void)state;
-    const unsigned total = 1000000, phase = 25000;
+    const unsigned total = TOTAL_CYCLES, phase = 25000;
     struct watch watch;
     struct rig rig;
     rig_two(&rig, NULL);

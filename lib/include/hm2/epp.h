@@ -110,9 +110,10 @@ HM2_API int HM2_MUST_CHECK epp_port_open(struct epp **epp, const struct epp_port
                                          struct hm2_diag *diag);
 
 /* The simulated bus of another process. A list is one datagram, its results another; system calls of a list: send(2),
- * ppoll(2), recv(2). A simulator that does not answer within EPP_SOCKET_WAIT_NS counts as a bus that does not. */
+ * ppoll(2), recv(2). A simulator that does not answer within wait_ns (epp_open: EPP_SOCKET_WAIT_NS) counts as a bus
+ * that does not. */
 #define EPP_SOCKET_WAIT_NS 20000000
-HM2_API int HM2_MUST_CHECK epp_socket_open(struct epp **epp, const char *path, struct hm2_diag *diag);
+HM2_API int HM2_MUST_CHECK epp_socket_open(struct epp **epp, const char *path, int64_t wait_ns, struct hm2_diag *diag);
 
 /* ---- the simulated bus on its socket (AF_UNIX, SOCK_SEQPACKET) ---------------------------------------------------
  * Request:  number (16 bits, little end first), count of steps (8), then for each step kind (8), len (8) and, when it

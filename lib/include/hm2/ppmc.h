@@ -51,6 +51,10 @@ HM2_API bool ppmc_identify(uint8_t id, struct ppmc_board_info *info);
 /* Write the filter rate register of the board in a slot: HM2_ERR_NOTFOUND, HM2_ERR_UNSUPPORTED. Not realtime safe. */
 HM2_API int HM2_MUST_CHECK ppmc_set_filter(struct epp *epp, unsigned slot, enum ppmc_filter filter,
                                            struct hm2_diag *diag);
+/* Read registers of a slot as they are, from an offset (0..15, or 31 for a board of two slots) on; reading the index
+ * sense register clears it, and counts are those of the last latch pulse. Not realtime safe. */
+HM2_API int HM2_MUST_CHECK ppmc_read_registers(struct epp *epp, unsigned slot, unsigned offset, uint8_t *bytes,
+                                               unsigned count, struct hm2_diag *diag);
 /* In MHz, for people. */
 HM2_API double ppmc_filter_mhz(enum ppmc_filter filter);
 
@@ -60,9 +64,10 @@ struct ppmc_options {
     uint16_t timestamps;                 /* bit of a slot: velocities by the board's timestamps */
     uint16_t expected;                   /* bit of a slot: a board with encoders must be there, at least; 0 = any */
     bool verify;                         /* read everything twice */
+    bool keep_counts;                    /* the counters go on from where they are */
 };
 
-/* No filter set, no timestamps, everything read twice, bus 0. */
+/* No filter set, counts set to 0, no timestamps, everything read twice, bus 0. */
 HM2_API struct ppmc_options ppmc_default_options(void);
 
 struct ppmc; /* the boards of a bus */

@@ -1,0 +1,400 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * PPMC boards as programs see them: hm2ppmcsim, hm2ppmc, and examples/ppmc-encoders.hal with ppmc_epp in hm2host and in
+ * LinuxCNC. The simulator turns the encoders, says what is true, and injects faults.
+ */
+#include <check.h>
+#include <inttypes.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "process.h"
+
+#define READY_MS   20000
+#define END_MS     20000
+#define CANNOT_RUN 77
+#define LOOKS      200u /* at a pin, until it shows what it must */
+#define LOOK_US    100000
+
+static struct process sim, host, tool;
+static char path[64];
+
+/* ---- programs -----------------------------------------------------------------------------------------------------
+ */
+
+static void start_sim(const char *const board)
+{
+    const char *const argv[] = {process_built("hm2ppmcsim"), "--socket", path, "--do", "board 2", "--do", board, "--do",
+                                "index 4.3 4000 100 4",      NULL};
+    snprintf(path, sizeof path, "/tmp/check-ppmc-%d", (int)getpid());
+    process_start_listening(&sim, argv);
+    if (!process_wait_line(&sim, "ready ", READY_MS, NULL))
+        ck_abort_msg("hm2ppmcsim is not ready: %s", sim.text);
+    ck_assert_int_eq(chmod(path, 0666), 0); /* LinuxCNC runs as another user */
+}
+
+static void stop_sim(void)
+{
+    ck_assert_int_eq(process_stop(&sim, SIGTERM, END_MS), 0);
+    ck_assert_int_ne(access(path, F_OK), 0);
+}
+
+/* The line that answers a command. */
+static const char *ask_sim(const char *const command)
+{
+    static char answer[512];
+    const size_t from = sim.len;
+    process_say(&sim, command);
+    process_say(&sim, "\n");
+    for (unsigned i = 0; i < LOOKS; i++) {
+        (void)process_wait_line(&sim, "never printed", 10, NULL); /* reads what there is */
+        const char *const end = strchr(sim.text + from, '\n');
+        if (!end)
+            continue;
+        snprintf(answer, sizeof answer, "%.*s", (int)(end - (sim.text + from)), sim.text + from);
+        return answer;
+    }
+    ck_abort_msg("hm2ppmcsim does not answer \"%s\": %s", command, sim.text);
+    return answer;
+}
+
+static void tell_sim(const char *const command)
+{
+    ck_assert_str_eq(ask_sim(command), "ok");
+}
+
+static int64_t truth(const char *const axis, const char *const what)
+{
+    char command[32];
+    long long value = 0;
+    snprintf(command, sizeof command, "show %s", axis);
+    const char *const at = strstr(ask_sim(command), what);
+    if (!at || sscanf(at + strlen(what), " %lld", &value) != 1)
+        ck_abort_msg("%s of %s is not told", what, axis);
+    return value;
+}
+
+static int run_tool(const char *const *arguments)
+{
+    char bus[80];
+    const char *argv[16] = {process_built("hm2ppmc"), "--bus", bus};
+    unsigned n = 3;
+    snprintf(bus, sizeof bus, "sim:%s", path);
+    while (*arguments)
+        argv[n++] = *arguments++;
+    argv[n] = NULL;
+    return process_run(&tool, argv, END_MS);
+}
+
+/* ---- hm2ppmc -------------------------------------------------------------------------------------------------------
+ */
+
+static const struct {
+    const char *arguments[5];
+    int status;
+    const char *said;
+} runs[] = {
+    {{"scan"},
+     0,
+     "slot  2  address 0x20-0x3F  ID 0x14  PPMC encoder board, 4 encoders, index, filter rate, timestamps\n"},
+    {{"scan"}, 0, "slot  4  address 0x40-0x4F  ID 0x21  PPMC DAC16 board\n2 boards\n"},
+    {{"identify", "4"}, 0, "ID 0x21"},
+    {{"identify", "7"}, 1, "Slot 7: no board answers."},
+    {{"identify"}, 2, "identify needs a slot"},
+    {{"identify", "16"}, 2, "identify needs a slot"},
+    {{"read", "2", "15"}, 0, "0x0F 14\n"},
+    {{"read", "2", "0", "3"}, 0, "0x00 00\n0x01 00\n0x02 00\n"},
+    {{"read", "3", "17"}, 1, "registers of this one 0 to 15"},
+    {{"read", "9"}, 1, "Slot 9, register 0: no answer in time."},
+    {{"filter", "2", "2.5"}, 0, "slot 2: encoder filter rate 2.5 MHz\n"},
+    {{"filter", "2", "3"}, 2, "rates are 1, 2.5, 5 and 10 MHz, not 3"},
+    {{"filter", "4", "5"}, 1, "has no filter rate register"},
+    {{"filter", "6", "5"}, 1, "Slot 6: no board answers."},
+    {{"watch", "--count", "2", "--period", "1"}, 0, "io errors 0, bad data 0, retries "},
+    {{"watch", "--period", "0"}, 2, "--period needs"},
+    {{"turn"}, 2, "unknown command turn"},
+};
+
+START_TEST(the_tool_says_what_is_there_and_what_is_wrong)
+{
+    start_sim("board 4 0x21");
+    for (size_t i = 0; i < sizeof runs / sizeof runs[0]; i++) {
+        const int status = run_tool(runs[i].arguments);
+        if (status != runs[i].status || !strstr(tool.text, runs[i].said))
+            ck_abort_msg("hm2ppmc %s: status %d: %.800s", runs[i].arguments[0], status, tool.text);
+    }
+    stop_sim();
+}
+END_TEST
+
+START_TEST(watching_shows_live_counts_and_leaves_the_counters)
+{
+    static const char *const watch[] = {"watch", "--count", "3", "--period", "1", NULL};
+    start_sim("board 4");
+    tell_sim("rate 2.1 100000");
+    usleep(50000);
+    tell_sim("rate 2.1 0");
+    for (unsigned i = 0; i < 2; i++) {
+        char line[64];
+        ck_assert_int_eq(run_tool(watch), 0);
+        snprintf(line, sizeof line, "\n0\t%" PRId64 "\t0\t", truth("2.1", "counted"));
+        ck_assert_msg(strstr(tool.text, line) != NULL, "no %s in %.500s", line, tool.text);
+    }
+    stop_sim();
+}
+END_TEST
+
+START_TEST(a_bus_that_is_not_there_is_told)
+{
+    static const char *const scan[] = {"scan", NULL};
+    snprintf(path, sizeof path, "/tmp/check-ppmc-none-%d", (int)getpid());
+    ck_assert_int_eq(run_tool(scan), 1);
+    ck_assert_ptr_nonnull(strstr(tool.text, "Start the simulated boards first"));
+}
+END_TEST
+
+/* ---- the example in a host -----------------------------------------------------------------------------------------
+ */
+
+/* All of the example up to its start, as commands of standard input. */
+static void say_example(void)
+{
+    char line[256];
+    FILE *const file = fopen(TEST_SOURCE "/examples/ppmc-encoders.hal", "r");
+    ck_assert_ptr_nonnull(file);
+    while (fgets(line, sizeof line, file)) {
+        process_say(&host, line);
+        if (strcmp(line, "start\n") == 0)
+            break;
+    }
+    fclose(file);
+}
+
+/* A pin's value, or -1e9 when the host has not answered yet. */
+static double look_at(const char *const pin)
+{
+    char command[96];
+    const size_t from = host.len;
+    double value = -1e9;
+    snprintf(command, sizeof command, "getp %s\n", pin);
+    process_say(&host, command);
+    for (unsigned i = 0; i < LOOKS && !strchr(host.text + from, '\n') && !host.ended; i++)
+        (void)process_wait_line(&host, "never printed", 20, NULL);
+    const char *at = host.text + from;
+    at += strncmp(at, "halcmd: ", 8) == 0 ? 8 : 0;
+    if (strncmp(at, "TRUE", 4) == 0)
+        return 1;
+    if (strncmp(at, "FALSE", 5) == 0)
+        return 0;
+    (void)sscanf(at, "%lf", &value);
+    return value;
+}
+
+static void expect_near(const char *const pin, const double wanted, const double tolerance)
+{
+    double found = 0;
+    for (unsigned i = 0; i < LOOKS; i++) {
+        found = look_at(pin);
+        if (fabs(found - wanted) <= tolerance)
+            return;
+        usleep(LOOK_US);
+    }
+    printf("%s\n", host.text);
+    ck_abort_msg("%s is %g, wanted %g", pin, found, wanted);
+}
+
+static void expect_pin(const char *const pin, const double wanted)
+{
+    expect_near(pin, wanted, 0);
+}
+
+static void wait_for_cycles(void)
+{
+    unsigned long cycles = 0;
+    for (unsigned i = 0; i < LOOKS && cycles < 5000 && !host.ended; i++) {
+        (void)process_wait_line(&host, "never printed", 50, NULL);
+        (void)sscanf(ask_sim("stats"), "cycles %lu", &cycles);
+    }
+    if (cycles < 5000) {
+        printf("%s\n", host.text);
+        ck_abort_msg("the example does not run");
+    }
+}
+
+static void compare_all(void)
+{
+    static const char *const axes[] = {"2.0", "2.1", "2.2", "2.3", "4.0", "4.1", "4.2"};
+    char pin[64];
+    for (unsigned i = 0; i < 7; i++) {
+        snprintf(pin, sizeof pin, "ppmc.0.encoder.%02u.count", i);
+        expect_pin(pin, (double)truth(axes[i], "counted"));
+    }
+    expect_pin("ppmc.0.encoder.07.count", (double)(truth("4.3", "counted") - truth("4.3", "preset-at")));
+}
+
+static void turn_all(const unsigned tenths)
+{
+    static const char *const axes[] = {"2.0 9000000", "2.1 -500000", "2.2 1000", "2.3 -33", "4.0 123456", "4.3 -20000"};
+    char command[64];
+    for (unsigned i = 0; i < 6; i++) {
+        snprintf(command, sizeof command, "rate %s", axes[i]);
+        tell_sim(command);
+    }
+    usleep(tenths * 100000);
+    for (unsigned i = 0; i < 6; i++) {
+        snprintf(command, sizeof command, "rate %.3s 0", axes[i]);
+        tell_sim(command);
+    }
+}
+
+static void run_example(void)
+{
+    wait_for_cycles();
+    expect_pin("ppmc.0.encoder.07.index-enable", 1);
+    turn_all(10);
+    compare_all();
+    ck_assert_int_eq(truth("4.3", "presets"), 1);
+    expect_pin("ppmc.0.encoder.07.index-enable", 0);
+    expect_near("ppmc.0.encoder.00.position", (double)truth("2.0", "counted") / 1000, 0.1); /* of six digits */
+    tell_sim("faults 1000 timeout zeros ones residue");
+    turn_all(20);
+    tell_sim("faults 0");
+    compare_all();
+    expect_pin("ppmc.0.fault", 0);
+    ck_assert(look_at("ppmc.0.timeouts") > 0 && look_at("ppmc.0.bad-data") > 0);
+    tell_sim("cable off");
+    expect_pin("ppmc.0.board.04.online", 0);
+    tell_sim("cable on");
+    expect_pin("ppmc.0.board.04.online", 1);
+    compare_all();
+}
+
+START_TEST(the_example_counts_exactly_in_hm2host)
+{
+    const char *const argv[] = {process_built("hm2host"), NULL};
+    start_sim("board 4");
+    ck_assert_int_eq(setenv("PPMC", path, 1), 0);
+    process_start_listening(&host, argv);
+    say_example();
+    run_example();
+    process_hush(&host);
+    ck_assert_msg(process_wait_end(&host, END_MS) && host.status == 0, "hm2host: %s", host.text);
+    stop_sim();
+}
+END_TEST
+
+START_TEST(the_example_counts_exactly_in_linuxcnc)
+{
+    const char *const argv[] = {TEST_SOURCE "/tests/system/halrun-user", "-", NULL};
+    const char *skip;
+    if (TEST_SANITIZED || access(TEST_BUILD "/linuxcnc/ppmc_epp.so", R_OK) != 0) {
+        printf("SKIP: %s\n", TEST_SANITIZED ? "a component built with a sanitizer cannot be loaded into LinuxCNC"
+                                            : "LinuxCNC's headers are not installed (linuxcnc-uspace-dev)");
+        return;
+    }
+    start_sim("board 4");
+    ck_assert_int_eq(setenv("PPMC", path, 1), 0);
+    ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
+    process_start_listening(&host, argv);
+    say_example();
+    if (process_wait_line(&host, "SKIP: ", 2000, &skip)) {
+        printf("%s\n", skip);
+        return;
+    }
+    run_example();
+    process_hush(&host);
+    ck_assert_msg(process_wait_end(&host, END_MS), "halrun: %s", host.text);
+    stop_sim();
+}
+END_TEST
+
+/* ---- the cyclic path -----------------------------------------------------------------------------------------------
+ */
+
+/* The cycle stands in files of its own, which call nothing but memory functions, each other, and the bus by pointer. */
+START_TEST(the_cycle_calls_nothing_that_allocates_locks_or_formats)
+{
+    static const char command[] =
+        "cd " TEST_BUILD "/obj/lib/ppmc && nm -u cycle.o encoder.o restore.o | "
+        "grep -vE '^$|:$| (memcmp|memcpy|memset|ppmc_[a-z_]*|_GLOBAL_OFFSET_TABLE_)$'; "
+        "cd ../link && nm -u epp_port.o | "
+        "grep -vE '^$|:$| (calloc|free|ioperm|strerror|__errno_location|hm2_diag_add|epp_monotonic_ns|"
+        "_GLOBAL_OFFSET_TABLE_)$'";
+    const char *const argv[] = {"sh", "-c", command, NULL};
+    if (TEST_SANITIZED) {
+        printf("SKIP: a sanitizer adds calls of its own\n");
+        return;
+    }
+    (void)process_run(&tool, argv, END_MS);
+    ck_assert_str_eq(tool.text, "");
+}
+END_TEST
+
+/* The servo thread is the one that sends. strace(1) writes "PID call(...". */
+START_TEST(the_servo_thread_makes_no_system_call_but_those_of_the_bus_and_its_sleep)
+{
+    char trace[96], command[1024];
+    if (!process_find("strace") || TEST_SANITIZED) {
+        printf("SKIP: strace is not installed, or a sanitizer makes calls of its own\n");
+        return;
+    }
+    start_sim("board 4");
+    ck_assert_int_eq(setenv("PPMC", path, 1), 0);
+    snprintf(trace, sizeof trace, "%s.trace", path);
+    snprintf(
+        command, sizeof command,
+        "strace -f -o %s %s %s/examples/ppmc-encoders.hal >/dev/null 2>&1 || { head -n 1 %s; exit 77; }\n"
+        "servo=$(grep -m 400 -oE '^[0-9]+ +sendto' %s | tail -n 1 | cut -d' ' -f1)\n"
+        "grep \"^$servo \" %s | grep -A100000 -m 1 sendto | grep -oE '^[0-9]+ +[a-z_0-9]+\\(' | sed 's/.* //' | sort | "
+        "uniq -c",
+        trace, process_built("hm2host"), TEST_SOURCE, trace, trace, trace);
+    const char *const argv[] = {"sh", "-c", command, NULL};
+    const int status = process_run(&tool, argv, 60000);
+    unlink(trace);
+    stop_sim();
+    if (status == CANNOT_RUN) {
+        printf("SKIP: strace cannot trace here: %s\n", tool.text);
+        return;
+    }
+    unsigned sends = 0, kinds = 0;
+    for (char *line = strtok(tool.text, "\n"); line; line = strtok(NULL, "\n")) {
+        unsigned count;
+        char name[32];
+        ck_assert_int_eq(sscanf(line, "%u %31s", &count, name), 2);
+        const bool once = strcmp(name, "exit(") == 0 || strcmp(name, "madvise(") == 0 ||
+                          strcmp(name, "rt_sigprocmask(") == 0 || strcmp(name, "munmap(") == 0;
+        const bool bus = strcmp(name, "sendto(") == 0 || strcmp(name, "ppoll(") == 0 || strcmp(name, "recvfrom(") == 0;
+        if (!bus && strcmp(name, "clock_nanosleep(") != 0 && !(once && count <= 4))
+            ck_abort_msg("the servo thread calls %s %u times", name, count);
+        sends = strcmp(name, "sendto(") == 0 ? count : sends;
+        kinds++;
+    }
+    ck_assert_uint_gt(sends, 300);
+    ck_assert_uint_ge(kinds, 4);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *const suite = suite_create("PPMC");
+    TCase *const tests = tcase_create("programs");
+    tcase_set_timeout(tests, 120);
+    tcase_add_test(tests, the_tool_says_what_is_there_and_what_is_wrong);
+    tcase_add_test(tests, watching_shows_live_counts_and_leaves_the_counters);
+    tcase_add_test(tests, a_bus_that_is_not_there_is_told);
+    tcase_add_test(tests, the_example_counts_exactly_in_hm2host);
+    tcase_add_test(tests, the_example_counts_exactly_in_linuxcnc);
+    tcase_add_test(tests, the_cycle_calls_nothing_that_allocates_locks_or_formats);
+    tcase_add_test(tests, the_servo_thread_makes_no_system_call_but_those_of_the_bus_and_its_sleep);
+    suite_add_tcase(suite, tests);
+    SRunner *const runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    const int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed > 0;
+}
