@@ -20,6 +20,7 @@ extern const struct hm2_module_type hm2_raw_type;
 extern const struct hm2_module_type hm2_ssi_type;
 extern const struct hm2_module_type hm2_ssr_type;
 extern const struct hm2_module_type hm2_stepgen_type;
+extern const struct hm2_module_type hm2_tppwm_type;
 extern const struct hm2_module_type hm2_watchdog_type;
 
 #endif

@@ -14,6 +14,7 @@ const struct hm2_module_type *const hm2_module_types[] = {
     &hm2_biss_type,
     &hm2_fanuc_type,
     &hm2_pwmgen_type,
+    &hm2_tppwm_type,
     &hm2_stepgen_type,
     &hm2_inmux_type,
     &hm2_inm_type,

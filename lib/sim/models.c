@@ -18,6 +18,7 @@ extern const struct sim_module_ops sim_muxed_select_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
 extern const struct sim_module_ops sim_ssi_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
+extern const struct sim_module_ops sim_tppwm_ops;
 extern const struct sim_module_ops sim_watchdog_ops;
 
 const struct sim_module_ops *const sim_models[] = {
@@ -38,5 +39,6 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_ssi_ops,           /* 08 */
     &sim_biss_ops,          /* 18 */
     &sim_fabs_ops,          /* 19 */
+    &sim_tppwm_ops,         /* 13 */
     NULL,
 };

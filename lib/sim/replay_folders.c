@@ -211,6 +211,26 @@ static const struct replay_signal fabs_signals[] = {
     {NULL, REPLAY_PAD, 0, 0, 0},
 };
 
+/* ---- tppwm ---------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register tppwm_registers[] = {
+    {"value", 0x4500, 4}, {"enable", 0x4600, 4}, {"setup", 0x4700, 4},
+    {"rate", 0x4800, 0},  {"rate_1", 0x4804, 0}, {NULL, 0, 0},
+};
+
+static const struct replay_signal tppwm_signals[] = {
+    {"A", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x81, 0},
+    {"B", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x82, 0},
+    {"C", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x83, 0},
+    {"NA", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x84, 0},
+    {"NB", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x85, 0},
+    {"NC", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x86, 0},
+    {"ena", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x87, 0},
+    {"fault", REPLAY_INPUT, HM2_GTAG_TPPWM, 0x08, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
 /* ---- before a test
  * ---------------------------------------------------------------------------------------------------- */
 
@@ -307,6 +327,11 @@ const struct replay_kind replay_kinds[] = {
      .signals = fabs_signals,
      .prepare = replay_absolute_prepare,
      .before_event = replay_absolute_event},
+    {.folder = "tppwm",
+     .firmware = "TPEN6_6_72",
+     .profile = "7i93",
+     .registers = tppwm_registers,
+     .signals = tppwm_signals},
     {.folder = "idrom", .extra = replay_idrom, .no_events = true},
     {.folder = "lbp16", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_lbp16, .no_events = true},
 };
