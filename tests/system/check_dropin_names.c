@@ -47,6 +47,9 @@ static const struct load loads[] = {
      "ssi_chan_0=a%12ub%3fc%1b%2pd%12s ssi_chan_1=pos%25ge biss_chan_1=turns%12hturns%18l fanuc_chan_0=AA64",
      "absolute_48"},
     {"7i93", "no-absolute", "", "absolute_48"},
+    {"7i93", "drives", "", "drives_29_48"},
+    {"7i93", "fewer-drives", "num_3pwmgens=1 num_rcpwmgens=1 num_oneshots=0 num_xy2mods=0 num_resolvers=4",
+     "drives_29_48"},
 };
 #define LOADS (sizeof loads / sizeof loads[0])
 
