@@ -20,6 +20,7 @@ extern const struct sim_module_ops sim_ssi_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_tppwm_ops;
 extern const struct sim_module_ops sim_watchdog_ops;
+extern const struct sim_module_ops sim_wavegen_ops;
 
 const struct sim_module_ops *const sim_models[] = {
     &sim_hm2dpll_ops,       /* 1A */
@@ -40,5 +41,6 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_biss_ops,          /* 18 */
     &sim_fabs_ops,          /* 19 */
     &sim_tppwm_ops,         /* 13 */
+    &sim_wavegen_ops,       /* 14 */
     NULL,
 };

@@ -231,6 +231,22 @@ static const struct replay_signal tppwm_signals[] = {
     {NULL, REPLAY_PAD, 0, 0, 0},
 };
 
+/* ---- wavegen -------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register wavegen_registers[] = {
+    {"rate", 0x2A00, 4},     {"pdmrate", 0x2B00, 4},   {"length", 0x2C00, 4},
+    {"tableptr", 0x2D00, 4}, {"tabledata", 0x2E00, 4}, {NULL, 0, 0},
+};
+
+static const struct replay_signal wavegen_signals[] = {
+    {"pdma", REPLAY_OUTPUT, HM2_GTAG_WAVEGEN, 0x81, 0},
+    {"pdmb", REPLAY_OUTPUT, HM2_GTAG_WAVEGEN, 0x82, 0},
+    {"trig0", REPLAY_OUTPUT, HM2_GTAG_WAVEGEN, 0x83, 0},
+    {"trig1", REPLAY_OUTPUT, HM2_GTAG_WAVEGEN, 0x84, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
 /* ---- before a test
  * ---------------------------------------------------------------------------------------------------- */
 
@@ -332,6 +348,11 @@ const struct replay_kind replay_kinds[] = {
      .profile = "7i93",
      .registers = tppwm_registers,
      .signals = tppwm_signals},
+    {.folder = "wavegen",
+     .firmware = "SVWG8_2IM2_72",
+     .profile = "7i93",
+     .registers = wavegen_registers,
+     .signals = wavegen_signals},
     {.folder = "idrom", .extra = replay_idrom, .no_events = true},
     {.folder = "lbp16", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_lbp16, .no_events = true},
 };
