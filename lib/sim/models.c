@@ -15,7 +15,9 @@ extern const struct sim_module_ops sim_irq_ops;
 extern const struct sim_module_ops sim_led_ops;
 extern const struct sim_module_ops sim_muxed_encoder_ops;
 extern const struct sim_module_ops sim_muxed_select_ops;
+extern const struct sim_module_ops sim_periodm_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
+extern const struct sim_module_ops sim_rcpwm_ops;
 extern const struct sim_module_ops sim_ssi_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_tppwm_ops;
@@ -42,5 +44,7 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_fabs_ops,          /* 19 */
     &sim_tppwm_ops,         /* 13 */
     &sim_wavegen_ops,       /* 14 */
+    &sim_rcpwm_ops,         /* 2C */
+    &sim_periodm_ops,       /* C8 */
     NULL,
 };

@@ -176,6 +176,79 @@ static void settings_of_a_period_meter_stay_within_their_registers(void **state)
     rig_free(rig);
 }
 
+static struct module_rig *with_card(const struct hm2_module_type *type)
+{
+    const struct hm2_image *const image = rig_image_with(modules, 7, NULL, 0);
+    struct module_rig *const rig = rig_new(image, "");
+    const struct sim_card_options options = {.profile = "7i96s", .image = image};
+    assert_int_equal(sim_card_new(&rig->card, &options, NULL), 0);
+    rig->clk = 1000;
+    rig->read_clk = 5;
+    (void)rig_add(rig, type);
+    rig_start(rig);
+    return rig;
+}
+
+static void a_simulated_meter_measures_pulses(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = with_card(&hm2_periodm_type);
+    rig_set(rig, "periodm.01.averages", 2);
+    rig_cycles(rig, 3);
+    for (int64_t i = 0; i < 20; i++) {
+        const int64_t at = rig->clk + 100 + i * 5000;
+        assert_int_equal(sim_card_drive_input(rig->card, at, HM2_GTAG_PERIODM, 1, 1, SIM_HIGH), 0);
+        assert_int_equal(sim_card_drive_input(rig->card, at + 1000, HM2_GTAG_PERIODM, 1, 1, SIM_LOW), 0);
+    }
+    rig_cycle(rig);
+    assert_true(rig_get(rig, "periodm.01.valid") == 1);
+    assert_true(fabs(rig_get(rig, "periodm.01.period_us") - 50) < 0.02);
+    assert_true(fabs(rig_get(rig, "periodm.01.duty_cycle") - 20) < 0.1);
+    rig_cycles(rig, 2100); /* slower than a hertz, twice */
+    assert_true(rig_get(rig, "periodm.01.valid") == 0);
+    sim_card_free(rig->card);
+    rig_free(rig);
+}
+
+struct pulse {
+    int64_t rise, high, period;
+};
+
+static void note_pulse(void *context, int64_t clk, unsigned ps, unsigned watch, enum sim_level level)
+{
+    struct pulse *const p = context;
+    (void)ps;
+    (void)watch;
+    if (level == SIM_HIGH) {
+        p->period = clk - p->rise;
+        p->rise = clk;
+    } else {
+        p->high = clk - p->rise;
+    }
+}
+
+static void a_simulated_servo_gets_its_pulses(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = with_card(&hm2_rcpwmgen_type);
+    struct pulse p = {0};
+    rig_set(rig, "rcpwmgen.00.width", 1.5);
+    rig_set(rig, "rcpwmgen.rate", 100);
+    rig_cycle(rig);
+    assert_int_equal(sim_card_watch_output(rig->card, HM2_GTAG_RCPWM, 0, 0x81), 0);
+    sim_card_on_edge(rig->card, note_pulse, &p);
+    rig_cycles(rig, 45);
+    assert_int_equal(p.period, 1000000);
+    assert_int_equal(p.high, 150000);
+    rig_set(rig, "rcpwmgen.00.width", 0);
+    rig_cycles(rig, 5);
+    p.high = 0;
+    rig_cycles(rig, 30);
+    assert_int_equal(p.high, 0);
+    sim_card_free(rig->card);
+    rig_free(rig);
+}
+
 /* ---- galvo interfaces ---------------------------------------------------------------------------------------------
  */
 
@@ -332,6 +405,8 @@ int main(void)
         cmocka_unit_test(one_shot_control_is_made_of_bits),
         cmocka_unit_test(a_period_is_shown_in_every_unit),
         cmocka_unit_test(settings_of_a_period_meter_stay_within_their_registers),
+        cmocka_unit_test(a_simulated_meter_measures_pulses),
+        cmocka_unit_test(a_simulated_servo_gets_its_pulses),
         cmocka_unit_test(commands_go_out_when_they_change),
         cmocka_unit_test(feedback_status_and_timers_of_a_galvo),
         cmocka_unit_test(recorded_positions_are_the_angles_of_the_bench),
