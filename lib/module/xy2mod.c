@@ -185,6 +185,8 @@ static void rest(const struct axis *const axis, const struct hm2_module *const m
     for (unsigned kind = 0; kind < KINDS; kind++) {
         *axis->command[kind] = 0.0;
         hm2_section_set(&ctx->values[kind][a], number, 0);
+        if (ctx->galvo[number].enabled) /* the module has moved on since a 0 was sent */
+            hm2_section_touch(&ctx->values[kind][a]);
     }
 }
 

@@ -23,6 +23,7 @@ extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_tppwm_ops;
 extern const struct sim_module_ops sim_watchdog_ops;
 extern const struct sim_module_ops sim_wavegen_ops;
+extern const struct sim_module_ops sim_xy2mod_ops;
 
 const struct sim_module_ops *const sim_models[] = {
     &sim_hm2dpll_ops,       /* 1A */
@@ -46,5 +47,6 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_wavegen_ops,       /* 14 */
     &sim_rcpwm_ops,         /* 2C */
     &sim_periodm_ops,       /* C8 */
+    &sim_xy2mod_ops,        /* 2B */
     NULL,
 };

@@ -306,6 +306,30 @@ static void feedback_status_and_timers_of_a_galvo(void **state)
     rig_free(rig);
 }
 
+static void a_simulated_galvo_moves_and_tells_its_limits(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = with_card(&hm2_xy2mod_type);
+    rig_set(rig, "xy2mod.00.enable", 1);
+    rig_set(rig, "xy2mod.00.velx-cmd", 10);
+    rig_cycles(rig, 52);
+    assert_true(fabs(rig_get(rig, "xy2mod.00.posx-fb") - 0.5) < 0.02);
+    assert_true(fabs(rig_get(rig, "xy2mod.00.velx-fb") - 10) < 0.001);
+    assert_true(rig_get(rig, "xy2mod.00.posx-overflow") == 0);
+    rig_cycles(rig, 60);
+    assert_true(fabs(rig_get(rig, "xy2mod.00.posx-fb") - 1) < 0.001);
+    assert_true(rig_get(rig, "xy2mod.00.posx-overflow") == 1 && rig_get(rig, "xy2mod.00.posy-overflow") == 0);
+    rig_set(rig, "xy2mod.00.enable", 0);
+    rig_cycles(rig, 2);
+    assert_true(rig_get(rig, "xy2mod.00.posx-fb") == 0 && rig_get(rig, "xy2mod.00.posx-overflow") == 0);
+    rig_set(rig, "xy2mod.00.enable", 1);
+    rig_set(rig, "xy2mod.00.accy-cmd", -1000);
+    rig_cycles(rig, 31);
+    assert_true(fabs(rig_get(rig, "xy2mod.00.posy-fb") + 0.45) < 0.05);
+    sim_card_free(rig->card);
+    rig_free(rig);
+}
+
 /* ---- resolvers ----------------------------------------------------------------------------------------------------
  */
 
@@ -409,6 +433,7 @@ int main(void)
         cmocka_unit_test(a_simulated_servo_gets_its_pulses),
         cmocka_unit_test(commands_go_out_when_they_change),
         cmocka_unit_test(feedback_status_and_timers_of_a_galvo),
+        cmocka_unit_test(a_simulated_galvo_moves_and_tells_its_limits),
         cmocka_unit_test(recorded_positions_are_the_angles_of_the_bench),
         cmocka_unit_test(turns_are_counted_and_velocity_follows_the_excitation),
         cmocka_unit_test(index_reset_and_position_file_of_a_resolver),
