@@ -41,6 +41,8 @@ const struct hm2_point hm2_absenc_encoder_rows[HM2_ABSENC_ENCODER_ROWS] = {
             "distance of the turns that index-enable waits for"),
 };
 
+_Static_assert(HM2_ABSENC_BOOLEAN_ROWS == HM2_ABSENC_BIT_ROWS, "bind_bits() takes either");
+
 /* ---- set-up --------------------------------------------------------------------------------------------------------
  */
 
@@ -80,11 +82,11 @@ static int bind_bits(const struct place *const p, struct hm2_absenc_field *const
 {
     const bool boolean = field->type == HM2_ABSENC_BOOLEAN;
     const unsigned count = boolean ? 1 : field->length;
+    const struct hm2_point *const rows = boolean ? hm2_absenc_boolean_rows : hm2_absenc_bit_rows;
     field->bits = hm2_setup_alloc(p->setup, count * sizeof field->bits[0]);
     int err = field->bits ? 0 : HM2_ERR_NOMEM;
     for (unsigned i = 0; i < count && !err; i++)
-        err = bind_rows(p, boolean ? hm2_absenc_boolean_rows : hm2_absenc_bit_rows,
-                        boolean ? HM2_ABSENC_BOOLEAN_ROWS : HM2_ABSENC_BIT_ROWS, &field->bits[i], i);
+        err = bind_rows(p, rows, HM2_ABSENC_BIT_ROWS, &field->bits[i], i);
     return err;
 }
 

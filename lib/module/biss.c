@@ -42,7 +42,7 @@ static int add_registers(struct hm2_absenc_channel *const channel, struct hm2_mo
 {
     static const enum hm2_rank ranks[HM2_ABSENC_WORDS] = {HM2_RANK_EARLY, HM2_RANK_NORMAL, HM2_RANK_LATE};
     int err = 0;
-    for (unsigned i = 0; i < channel->words && !err; i++)
+    for (unsigned i = 0; i < channel->words && i < HM2_ABSENC_WORDS && !err; i++)
         err = hm2_plan_add_read(setup->plan, &channel->data[i], ranks[i],
                                 hm2_md_address(module->md, REG_DATA, channel->number), 1, setup->diag);
     if (!err)

@@ -20,14 +20,19 @@ extern const struct sim_module_ops sim_muxed_encoder_ops;
 extern const struct sim_module_ops sim_muxed_select_ops;
 extern const struct sim_module_ops sim_pktuart_rx_ops;
 extern const struct sim_module_ops sim_pktuart_tx_ops;
+extern const struct sim_module_ops sim_periodm_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
+extern const struct sim_module_ops sim_rcpwm_ops;
 extern const struct sim_module_ops sim_ssi_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_sserial_ops;
 extern const struct sim_module_ops sim_sserialb_ops;
 extern const struct sim_module_ops sim_uart_rx_ops;
 extern const struct sim_module_ops sim_uart_tx_ops;
+extern const struct sim_module_ops sim_tppwm_ops;
 extern const struct sim_module_ops sim_watchdog_ops;
+extern const struct sim_module_ops sim_wavegen_ops;
+extern const struct sim_module_ops sim_xy2mod_ops;
 
 const struct sim_module_ops *const sim_models[] = {
     &sim_hm2dpll_ops,       /* 1A */
@@ -56,5 +61,10 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_ssi_ops,           /* 08 */
     &sim_biss_ops,          /* 18 */
     &sim_fabs_ops,          /* 19 */
+    &sim_tppwm_ops,         /* 13 */
+    &sim_wavegen_ops,       /* 14 */
+    &sim_rcpwm_ops,         /* 2C */
+    &sim_periodm_ops,       /* C8 */
+    &sim_xy2mod_ops,        /* 2B */
     NULL,
 };

@@ -293,6 +293,40 @@ static const struct replay_signal fabs_signals[] = {
 static const struct replay_register sslbp_registers[] = {
     {"command", 0x5A00, 0}, {"data", 0x5B00, 0},   {"cs", 0x5C00, 4}, {"user0_", 0x5D00, 4},
     {"user1_", 0x5E00, 4},  {"user2_", 0x5F00, 4}, {NULL, 0, 0},
+/* ---- tppwm ---------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register tppwm_registers[] = {
+    {"value", 0x4500, 4}, {"enable", 0x4600, 4}, {"setup", 0x4700, 4},
+    {"rate", 0x4800, 0},  {"rate_1", 0x4804, 0}, {NULL, 0, 0},
+};
+
+static const struct replay_signal tppwm_signals[] = {
+    {"A", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x81, 0},
+    {"B", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x82, 0},
+    {"C", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x83, 0},
+    {"NA", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x84, 0},
+    {"NB", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x85, 0},
+    {"NC", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x86, 0},
+    {"ena", REPLAY_OUTPUT, HM2_GTAG_TPPWM, 0x87, 0},
+    {"fault", REPLAY_INPUT, HM2_GTAG_TPPWM, 0x08, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
+/* ---- wavegen -------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register wavegen_registers[] = {
+    {"rate", 0x2A00, 4},     {"pdmrate", 0x2B00, 4},   {"length", 0x2C00, 4},
+    {"tableptr", 0x2D00, 4}, {"tabledata", 0x2E00, 4}, {NULL, 0, 0},
+};
+
+static const struct replay_signal wavegen_signals[] = {
+    {"pdma", REPLAY_OUTPUT, HM2_GTAG_WAVEGEN, 0x81, 0},
+    {"pdmb", REPLAY_OUTPUT, HM2_GTAG_WAVEGEN, 0x82, 0},
+    {"trig0", REPLAY_OUTPUT, HM2_GTAG_WAVEGEN, 0x83, 0},
+    {"trig1", REPLAY_OUTPUT, HM2_GTAG_WAVEGEN, 0x84, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
 };
 
 /* ---- before a test
@@ -451,6 +485,16 @@ const struct replay_kind replay_kinds[] = {
      .signals = fabs_signals,
      .prepare = replay_absolute_prepare,
      .before_event = replay_absolute_event},
+    {.folder = "tppwm",
+     .firmware = "TPEN6_6_72",
+     .profile = "7i93",
+     .registers = tppwm_registers,
+     .signals = tppwm_signals},
+    {.folder = "wavegen",
+     .firmware = "SVWG8_2IM2_72",
+     .profile = "7i93",
+     .registers = wavegen_registers,
+     .signals = wavegen_signals},
     {.folder = "idrom", .extra = replay_idrom, .no_events = true},
     {.folder = "lbp16", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_lbp16, .no_events = true},
 };

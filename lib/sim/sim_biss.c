@@ -100,7 +100,7 @@ static void request_edge(struct request *const r)
 static void filter_edge(struct channel *const c, const bool line)
 {
     const unsigned before = c->filter, length = filter_length(c);
-    c->pipe = (uint8_t)((c->pipe << 1 | (c->filtered ? 1u : 0u)) & 7u);
+    c->pipe = (uint8_t)((c->pipe * 2u + (c->filtered ? 1u : 0u)) & 7u);
     if (!c->sampled && before > 0)
         c->filter = (uint8_t)(before - 1u);
     else if (c->sampled && before != length)
@@ -116,7 +116,7 @@ static void lifo_edge(struct channel *const c, const bool sampling)
 {
     const bool push = sampling && c->data && c->pointer == 1, pop = takes(&c->pop);
     if (sampling && c->data)
-        c->lifo[c->pointer] = (uint16_t)(c->lifo[c->pointer] << 1 | (c->pipe >> 2 & 1u));
+        c->lifo[c->pointer] = (uint16_t)(c->lifo[c->pointer] * 2u + (c->pipe >> 2 & 1u));
     if (push && !pop && c->level < LIFO_WORDS)
         c->level++;
     if (pop && !push && c->level > 0) {

@@ -57,7 +57,7 @@ struct fabs {
 static void filter_edge(struct channel *const c, const bool line)
 {
     const unsigned before = c->filter;
-    c->pipe = (uint8_t)((c->pipe << 1 | (c->filtered ? 1u : 0u)) & 3u);
+    c->pipe = (uint8_t)((c->pipe * 2u + (c->filtered ? 1u : 0u)) & 3u);
     if (before > c->filter_clk)
         c->filter = c->filter_clk;
     if (!c->sampled && before > 0)

@@ -30,6 +30,7 @@ struct load {
 };
 
 #define ABSOLUTE TEST_DATA "/firmware/absolute_48.hex"
+#define DRIVES   TEST_DATA "/firmware/drives_29_48.hex"
 
 static const struct load loads[] = {
     {"7i96s", "default", "", NULL, NULL},
@@ -56,6 +57,9 @@ static const struct load loads[] = {
      "ssi_chan_0=a%12ub%3fc%1b%2pd%12s ssi_chan_1=pos%25ge biss_chan_1=turns%12hturns%18l fanuc_chan_0=AA64",
      "--firmware", ABSOLUTE},
     {"7i93", "no-absolute", "", "--firmware", ABSOLUTE},
+    {"7i93", "drives", "", "--firmware", DRIVES},
+    {"7i93", "fewer-drives", "num_3pwmgens=1 num_rcpwmgens=1 num_oneshots=0 num_xy2mods=0 num_resolvers=4",
+     "--firmware", DRIVES},
 };
 #define LOADS (sizeof loads / sizeof loads[0])
 
