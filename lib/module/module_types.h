@@ -5,6 +5,7 @@
 
 #include <hm2/module.h>
 
+extern const struct hm2_module_type hm2_bspi_type;
 extern const struct hm2_module_type hm2_dpll_type;
 extern const struct hm2_module_type hm2_encoder_type;
 extern const struct hm2_module_type hm2_inm_type;

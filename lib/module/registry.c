@@ -16,6 +16,7 @@ const struct hm2_module_type *const hm2_module_types[] = {
     &hm2_inm_type,
     &hm2_ssr_type,
     &hm2_outm_type,
+    &hm2_bspi_type,
     &hm2_dpll_type,
     &hm2_led_type,
     &hm2_ioport_type,
