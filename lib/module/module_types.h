@@ -14,10 +14,14 @@ extern const struct hm2_module_type hm2_ioport_type;
 extern const struct hm2_module_type hm2_led_type;
 extern const struct hm2_module_type hm2_muxed_encoder_type;
 extern const struct hm2_module_type hm2_outm_type;
+extern const struct hm2_module_type hm2_pktuart_rx_type;
+extern const struct hm2_module_type hm2_pktuart_type;
 extern const struct hm2_module_type hm2_pwmgen_type;
 extern const struct hm2_module_type hm2_raw_type;
 extern const struct hm2_module_type hm2_ssr_type;
 extern const struct hm2_module_type hm2_stepgen_type;
+extern const struct hm2_module_type hm2_uart_rx_type;
+extern const struct hm2_module_type hm2_uart_type;
 extern const struct hm2_module_type hm2_watchdog_type;
 
 #endif
