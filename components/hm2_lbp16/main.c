@@ -37,6 +37,10 @@ EXPORT_SYMBOL(hm2_bspi_write_chan);
 EXPORT_SYMBOL(hm2_allocate_bspi_tram);
 EXPORT_SYMBOL(hm2_bspi_clear_fifo);
 EXPORT_SYMBOL(hm2_tram_add_bspi_frame);
+EXPORT_SYMBOL(hm2_uart_setup);
+EXPORT_SYMBOL(hm2_uart_send);
+EXPORT_SYMBOL(hm2_uart_read);
+EXPORT_SYMBOL(hm2_serial_use);
 
 #define MAX_CARDS 16
 

@@ -13,6 +13,8 @@
 #define MAX_WIRES    32u
 #define MAX_PATTERNS 32u
 #define PATTERN_BITS 64u
+#define MAX_SERIAL   16u
+#define SERIAL_PATH  256u
 
 struct wire {
     unsigned from, to;
@@ -51,6 +53,13 @@ struct pattern {
     int64_t step_ns;
 };
 
+/* A serial port and what hangs at it: "loop", or the path of a terminal to make. */
+struct serial_option {
+    uint8_t gtag;
+    unsigned unit;
+    const char *target;
+};
+
 struct card_options {
     const char *type;
     struct in_addr address;
@@ -64,6 +73,10 @@ struct card_options {
     struct encoder_index indices[MAX_WIRES];
     struct position_switch switches[MAX_WIRES];
     struct pattern patterns[MAX_PATTERNS];
+    unsigned serial_count;
+    struct serial_option serial[MAX_SERIAL];
+    bool has_servo_card; /* a 7I65 at a buffered SPI port */
+    unsigned servo_port;
 };
 
 struct options {
