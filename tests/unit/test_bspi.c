@@ -6,8 +6,8 @@
 
 #include "sim_bench.h"
 
-#define PIN_MOSI    0x82
-#define PIN_MISO    0x04
+#define PIN_MOSI 0x82
+#define PIN_MISO 0x04
 
 static const struct hm2_bspi_channel bits16 = {.chip_select = 3, .bits = 16, .mhz = 6.0, .cpol = true};
 

@@ -24,7 +24,7 @@ struct hm2_bspi_channel {
     unsigned chip_select; /* 0..15 */
     unsigned bits;        /* 1..32: the firmware sends no more (Annex D) */
     double mhz;           /* > 0; at most half of the module's clock is used */
-    unsigned delay_ns;    /* before and after the frame; 0 = none. As far as the 16 clocks reach that the port can wait */
+    unsigned delay_ns; /* before and after the frame; 0 = none. As far as the 16 clocks reach that the port can wait */
     bool cpol, cpha;
     bool keep_frame;  /* chip select stays active after the word */
     bool no_echo;     /* nothing is received */

@@ -110,7 +110,8 @@ HM2_API int HM2_MUST_CHECK sim_card_serial(struct sim_card *card, uint8_t gtag, 
 HM2_API size_t sim_card_serial_put(struct sim_card *card, uint8_t gtag, unsigned unit, const uint8_t *bytes,
                                    size_t len);
 
-/* ---- 7I65 --------------------------------------------------------------------------------------------------------- */
+/* ---- 7I65 ---------------------------------------------------------------------------------------------------------
+ */
 
 #define SIM_7I65_CHANNELS 8u
 
