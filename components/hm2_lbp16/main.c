@@ -9,6 +9,7 @@
  */
 #include <errno.h>
 #include <stdatomic.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
@@ -19,14 +20,28 @@
 #include <hm2/board.h>
 #include <hm2/link.h>
 
+#include "cards.h"
 #include "common/hal_binder.h"
 #include "common/messenger.h"
+#include "exports.h"
 #include "flight_files.h"
 #include "isolation.h"
 
 MODULE_AUTHOR("libhm2 developers");
 MODULE_DESCRIPTION("Mesa Electronics HostMot2 cards over Ethernet (LBP16)");
 MODULE_LICENSE("GPL");
+
+EXPORT_SYMBOL(hm2_bspi_setup_chan);
+EXPORT_SYMBOL(hm2_bspi_set_read_function);
+EXPORT_SYMBOL(hm2_bspi_set_write_function);
+EXPORT_SYMBOL(hm2_bspi_write_chan);
+EXPORT_SYMBOL(hm2_allocate_bspi_tram);
+EXPORT_SYMBOL(hm2_bspi_clear_fifo);
+EXPORT_SYMBOL(hm2_tram_add_bspi_frame);
+EXPORT_SYMBOL(hm2_uart_setup);
+EXPORT_SYMBOL(hm2_uart_send);
+EXPORT_SYMBOL(hm2_uart_read);
+EXPORT_SYMBOL(hm2_serial_use);
 
 #define MAX_CARDS 16
 
@@ -70,6 +85,7 @@ RTAPI_MP_INT(sserial_baudrate, "force the smart-serial baud rate; -1 = as the fi
 struct card {
     struct hm2_board *board;
     atomic_bool busy;  /* one of its functions runs */
+    atomic_bool held;  /* its functions leave the board alone */
     atomic_int thread; /* the realtime thread that called .read last */
     unsigned cycle;    /* calls of .read so far; only that thread looks at it */
 };
@@ -90,7 +106,7 @@ static atomic_bool closing; /* no function may touch a board any more */
 static bool enter(struct card *const card)
 {
     atomic_store(&card->busy, true);
-    if (!atomic_load(&closing))
+    if (!atomic_load(&closing) && !atomic_load(&card->held))
         return true;
     atomic_store_explicit(&card->busy, false, memory_order_release);
     return false;
@@ -153,14 +169,56 @@ static void card_write(void *const arg, const long period)
 #define CLOSE_STEP_NS 1000000L
 #define CLOSE_STEPS   2000u /* a read waits for its reply, at most for packet-read-timeout */
 
+static void await_functions(struct card *const card)
+{
+    const struct timespec step = {.tv_nsec = CLOSE_STEP_NS};
+    for (unsigned steps = 0; atomic_load(&card->busy) && steps < CLOSE_STEPS; steps++)
+        nanosleep(&step, NULL);
+}
+
 /* Afterwards no function touches a board. */
 static void close_functions(void)
 {
-    const struct timespec step = {.tv_nsec = CLOSE_STEP_NS};
     atomic_store(&closing, true);
-    for (unsigned i = 0, steps = 0; i < card_count; i++)
-        while (atomic_load(&cards[i].busy) && steps++ < CLOSE_STEPS)
-            nanosleep(&step, NULL);
+    for (unsigned i = 0; i < card_count; i++)
+        await_functions(&cards[i]);
+}
+
+/* ---- for the functions that other components call -----------------------------------------------------------------
+ */
+
+void card_pause(struct card *const card)
+{
+    atomic_store(&card->held, true);
+    await_functions(card);
+}
+
+void card_resume(struct card *const card)
+{
+    atomic_store(&card->held, false);
+}
+
+struct hm2_board *card_board(struct card *const card)
+{
+    return card->board;
+}
+
+struct card *card_of_port(const char *const name, const char *const kind, unsigned *const unit)
+{
+    for (unsigned i = 0; name && i < card_count; i++) {
+        char prefix[HAL_NAME_LEN + 1];
+        const int len = rtapi_snprintf(prefix, sizeof prefix, "%s.%s.", hm2_board_prefix(cards[i].board), kind);
+        if (len <= 0 || strncmp(name, prefix, (size_t)len) != 0)
+            continue;
+        char *end;
+        const unsigned long number = strtoul(name + len, &end, 10);
+        *unit = (unsigned)number;
+        if (end != name + len && *end == '\0' && number <= 255)
+            return &cards[i];
+    }
+    rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: there is no %s \"%s\"; the ports of the first card are %s.%s.0 and on\n",
+                    kind, name ? name : "", card_count ? hm2_board_prefix(cards[0].board) : "hm2_<card>.0", kind);
+    return NULL;
 }
 
 static const struct {
@@ -293,6 +351,7 @@ static int load_card(const char *const address, const char *const configuration)
         return -ENOMEM;
     }
     atomic_store(&card->busy, false);
+    atomic_store(&card->held, false);
     atomic_store(&card->thread, NO_THREAD);
     card->cycle = 0;
     card_count++;

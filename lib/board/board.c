@@ -120,6 +120,31 @@ int hm2_board_start(struct hm2_board *const board, struct hm2_diag *const diag)
     return 0;
 }
 
+/* ---- additions ----------------------------------------------------------------------------------------------------
+ */
+
+struct hm2_module *hm2_board_module(struct hm2_board *const board, const uint8_t gtag)
+{
+    for (unsigned i = 0; i < board->module_count; i++)
+        if (board->modules[i].type->gtag == gtag)
+            return &board->modules[i];
+    return NULL;
+}
+
+void hm2_board_change_begin(struct hm2_board *const board)
+{
+    board->outstanding = false;
+    hm2_plan_reopen(board->plan);
+}
+
+int hm2_board_change_end(struct hm2_board *const board, struct hm2_diag *const diag)
+{
+    const int err = hm2_plan_freeze(board->plan, diag);
+    if (err < 0 && board->state == BOARD_RUNS)
+        board->state = BOARD_STOPPED;
+    return err;
+}
+
 /* ---- stop ---------------------------------------------------------------------------------------------------------
  */
 

@@ -39,6 +39,9 @@ struct plan_window {
     uint16_t address, words;
     uint8_t rank;
     bool movable;
+    bool queue;     /* all words at one address */
+    uint16_t was;   /* place of its words before the plan was opened again, plus one; 0 = none */
+    uint16_t aimed; /* and where its address pointed then */
 };
 
 struct plan_list {

@@ -7,6 +7,8 @@
 #include "plan_internal.h"
 
 #define REGISTER_SPACE_BYTES 0x10000u
+#define RANK_MOVABLE         ((uint8_t)HM2_RANK_LAST + 1u)
+#define RANK_QUEUE           ((uint8_t)HM2_RANK_LAST + 2u)
 
 size_t hm2_plan_size(void)
 {
@@ -63,20 +65,47 @@ static uint16_t clamped(const unsigned words)
 int hm2_plan_add_read(struct hm2_plan *const plan, struct hm2_window *const window, const enum hm2_rank rank,
                       const uint16_t address, const unsigned words, struct hm2_diag *const diag)
 {
-    const struct plan_window added = {window, address, clamped(words), (uint8_t)rank, false};
+    const struct plan_window added = {
+        .window = window, .address = address, .words = clamped(words), .rank = (uint8_t)rank};
     return add_window(plan, &plan->reads, &added, diag);
 }
 
 int hm2_plan_add_read_movable(struct hm2_plan *const plan, struct hm2_window *const window, struct hm2_diag *const diag)
 {
-    const struct plan_window added = {window, 0, 1, (uint8_t)HM2_RANK_LAST + 1u, true};
+    const struct plan_window added = {.window = window, .words = 1, .rank = RANK_MOVABLE, .movable = true};
     return add_window(plan, &plan->reads, &added, diag);
+}
+
+/* Equal addresses keep the order of registration; where a queue begins is told apart. */
+static struct plan_window queue(struct hm2_window *const window, const uint16_t address, const unsigned words)
+{
+    return (struct plan_window){.window = window,
+                                .words = clamped(words),
+                                .rank = RANK_QUEUE,
+                                .movable = true,
+                                .queue = true,
+                                .aimed = address};
+}
+
+int hm2_plan_add_queue_read(struct hm2_plan *const plan, struct hm2_window *const window, const uint16_t address,
+                            const unsigned words, struct hm2_diag *const diag)
+{
+    const struct plan_window added = queue(window, address, words);
+    return add_window(plan, &plan->reads, &added, diag);
+}
+
+int hm2_plan_add_queue_write(struct hm2_plan *const plan, struct hm2_window *const window, const uint16_t address,
+                             const unsigned words, struct hm2_diag *const diag)
+{
+    const struct plan_window added = queue(window, address, words);
+    return add_window(plan, &plan->writes, &added, diag);
 }
 
 int hm2_plan_add_write(struct hm2_plan *const plan, struct hm2_window *const window, const enum hm2_rank rank,
                        const uint16_t address, const unsigned words, struct hm2_diag *const diag)
 {
-    const struct plan_window added = {window, address, clamped(words), (uint8_t)rank, false};
+    const struct plan_window added = {
+        .window = window, .address = address, .words = clamped(words), .rank = (uint8_t)rank};
     return add_window(plan, &plan->writes, &added, diag);
 }
 
@@ -145,15 +174,16 @@ static void sort_sections(struct hm2_plan *const plan)
             plan->sections[at] = plan->sections[at - 1];
         plan->sections[at] = moved;
     }
-    struct plan_set dirty = {{0}};
+    struct plan_set states[PLAN_STATES] = {{{0}}};
     for (unsigned i = 0; i < plan->section_count; i++) {
         struct hm2_section *const section = plan->sections[i].section;
         const unsigned before = section->number;
-        if (plan->in_state[PLAN_DIRTY].bits[before / 64u] >> before % 64u & 1u)
-            dirty.bits[i / 64u] |= UINT64_C(1) << i % 64u;
+        for (unsigned state = 0; state < PLAN_STATES; state++)
+            if (plan->in_state[state].bits[before / 64u] >> before % 64u & 1u)
+                states[state].bits[i / 64u] |= UINT64_C(1) << i % 64u;
         section->number = (uint16_t)i;
     }
-    plan->in_state[PLAN_DIRTY] = dirty;
+    memcpy(plan->in_state, states, sizeof states);
 }
 
 /* Number of windows from `first` on that share one command, and their words. */
@@ -163,8 +193,8 @@ static unsigned run_length(const struct plan_list *const list, const unsigned fi
     *words = list->at[first].words;
     while (end < list->count) {
         const struct plan_window *const last = &list->at[end - 1], *const next = &list->at[end];
-        if (next->movable || next->rank != last->rank || next->address != last->address + 4u * last->words ||
-            *words + next->words > LBP16_MAX_COUNT)
+        if (next->movable || last->movable || next->rank != last->rank ||
+            next->address != last->address + 4u * last->words || *words + next->words > LBP16_MAX_COUNT)
             break;
         *words += next->words;
         end++;
@@ -189,7 +219,7 @@ static int check_overlap(const struct plan_list *const writes, struct hm2_diag *
 {
     for (unsigned i = 1; i < writes->count; i++) {
         const struct plan_window *const last = &writes->at[i - 1], *const next = &writes->at[i];
-        if (next->rank == last->rank && next->address < last->address + 4u * last->words)
+        if (!next->movable && next->rank == last->rank && next->address < last->address + 4u * last->words)
             return hm2_diag_add(diag, HM2_ERR_MISMATCH,
                                 "The register at 0x%04X would be written twice in every cycle: two modules of this "
                                 "firmware share an address.",
@@ -221,6 +251,17 @@ static int check_sizes(const struct hm2_plan *const plan, const size_t read_byte
     return err;
 }
 
+static struct lbp16_command command_of(const struct plan_window *const first, const unsigned words, const bool write)
+{
+    return (struct lbp16_command){.write = write,
+                                  .has_address = true,
+                                  .space = LBP16_SPACE_HM2,
+                                  .size = LBP16_SIZE_32,
+                                  .increment = !first->queue,
+                                  .count = words,
+                                  .address = first->movable ? first->aimed : first->address};
+}
+
 static int lay_out_reads(struct hm2_plan *const plan)
 {
     static const uint16_t zero[2] = {0};
@@ -233,7 +274,8 @@ static int lay_out_reads(struct hm2_plan *const plan)
         size_t at;
         const unsigned end = first + run_length(list, first, &words);
         uint8_t *const address = plan->request + builder.used + 2u;
-        const int err = lbp16_add_read_hm2(&builder, list->at[first].address, words, &at);
+        const struct lbp16_command command = command_of(&list->at[first], words, false);
+        const int err = lbp16_add_read(&builder, &command, &at);
         if (err)
             return err;
         if (list->at[first].movable)
@@ -259,9 +301,13 @@ static int lay_out_writes(struct hm2_plan *const plan)
         unsigned words;
         size_t at;
         const unsigned end = first + run_length(list, first, &words);
-        const int err = lbp16_add_write_hm2(&builder, list->at[first].address, words, NULL, &at);
+        uint8_t *const address = plan->write + builder.used + 2u;
+        const struct lbp16_command command = command_of(&list->at[first], words, true);
+        const int err = lbp16_add_write(&builder, &command, NULL, &at);
         if (err)
             return err;
+        if (list->at[first].movable)
+            list->at[first].window->address = address;
         for (; first < end; first++) {
             list->at[first].window->bytes = plan->write + at;
             at += 4u * list->at[first].words;
@@ -285,10 +331,39 @@ static int prepare_numbers(struct hm2_plan *const plan)
     return err;
 }
 
+static void note_places(struct plan_list *const list, const uint8_t *const base)
+{
+    for (unsigned i = 0; i < list->count; i++) {
+        struct plan_window *const at = &list->at[i];
+        at->was = (uint16_t)(at->window->bytes - base + 1);
+        if (at->window->address)
+            at->aimed = hm2_get_le16(at->window->address);
+    }
+}
+
+static void carry_words(const struct plan_list *const list, const uint8_t *const before)
+{
+    for (unsigned i = 0; i < list->count; i++)
+        if (list->at[i].was > 0)
+            memcpy(list->at[i].window->bytes, before + list->at[i].was - 1, 4u * (size_t)list->at[i].words);
+}
+
+void hm2_plan_reopen(struct hm2_plan *const plan)
+{
+    if (!plan->frozen)
+        return;
+    plan->frozen = plan->outstanding = false;
+    note_places(&plan->reads, plan->reply);
+    note_places(&plan->writes, plan->write);
+}
+
 int hm2_plan_freeze(struct hm2_plan *const plan, struct hm2_diag *const diag)
 {
     if (plan->frozen)
         return hm2_diag_add(diag, HM2_ERR_STATE, "The packets are laid out already.");
+    uint8_t reply[sizeof plan->reply], write[sizeof plan->write];
+    memcpy(reply, plan->reply, sizeof reply);
+    memcpy(write, plan->write, sizeof write);
     sort_windows(&plan->reads);
     sort_windows(&plan->writes);
     sort_sections(plan);
@@ -301,6 +376,10 @@ int hm2_plan_freeze(struct hm2_plan *const plan, struct hm2_diag *const diag)
         err = lay_out_writes(plan);
     if (!err)
         err = prepare_numbers(plan);
+    if (!err) {
+        carry_words(&plan->reads, reply);
+        carry_words(&plan->writes, write);
+    }
     plan->frozen = !err;
     return err;
 }

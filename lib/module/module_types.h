@@ -6,6 +6,7 @@
 #include <hm2/module.h>
 
 extern const struct hm2_module_type hm2_biss_type;
+extern const struct hm2_module_type hm2_bspi_type;
 extern const struct hm2_module_type hm2_dpll_type;
 extern const struct hm2_module_type hm2_encoder_type;
 extern const struct hm2_module_type hm2_fanuc_type;
@@ -17,6 +18,8 @@ extern const struct hm2_module_type hm2_muxed_encoder_type;
 extern const struct hm2_module_type hm2_oneshot_type;
 extern const struct hm2_module_type hm2_outm_type;
 extern const struct hm2_module_type hm2_periodm_type;
+extern const struct hm2_module_type hm2_pktuart_rx_type;
+extern const struct hm2_module_type hm2_pktuart_type;
 extern const struct hm2_module_type hm2_pwmgen_type;
 extern const struct hm2_module_type hm2_raw_type;
 extern const struct hm2_module_type hm2_sserial_type;
@@ -27,6 +30,8 @@ extern const struct hm2_module_type hm2_ssi_type;
 extern const struct hm2_module_type hm2_ssr_type;
 extern const struct hm2_module_type hm2_stepgen_type;
 extern const struct hm2_module_type hm2_tppwm_type;
+extern const struct hm2_module_type hm2_uart_rx_type;
+extern const struct hm2_module_type hm2_uart_type;
 extern const struct hm2_module_type hm2_watchdog_type;
 extern const struct hm2_module_type hm2_xy2mod_type;
 

@@ -293,6 +293,8 @@ static const struct replay_signal fabs_signals[] = {
 static const struct replay_register sslbp_registers[] = {
     {"command", 0x5A00, 0}, {"data", 0x5B00, 0},   {"cs", 0x5C00, 4}, {"user0_", 0x5D00, 4},
     {"user1_", 0x5E00, 4},  {"user2_", 0x5F00, 4}, {NULL, 0, 0},
+};
+
 /* ---- tppwm ---------------------------------------------------------------------------------------------------------
  */
 

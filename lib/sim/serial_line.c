@@ -103,6 +103,10 @@ void serial_pair_advance(const struct serial_pair *const pair, struct sim_module
 {
     struct sim_module *const tx = sim_module_of(either->card, pair->tx_gtag);
     struct sim_module *const rx = sim_module_of(either->card, pair->rx_gtag);
+    if (tx)
+        tx->advancing = true;
+    if (rx)
+        rx->advancing = true;
     while ((tx && tx->clk < clk) || (rx && rx->clk < clk)) {
         int64_t to = clk;
         if (tx && rx && pair->tx_event(tx) + 1 < clk && pair->tx_event(tx) != SIM_NEVER)
@@ -118,4 +122,8 @@ void serial_pair_advance(const struct serial_pair *const pair, struct sim_module
         if (tx && rx)
             pair->couple(tx, rx);
     }
+    if (tx)
+        tx->advancing = false;
+    if (rx)
+        rx->advancing = false;
 }

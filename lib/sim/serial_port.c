@@ -3,9 +3,13 @@
 #include "card_state.h"
 #include "serial_line.h"
 
+/* A peer may answer a byte from within the step in which it was sent: the receiver is as far as that then. */
 static struct serial_feed *feed_of(struct sim_card *const card, const uint8_t gtag, const unsigned unit)
 {
-    struct sim_module *const rx = sim_find(card, gtag == HM2_GTAG_UART_TX ? HM2_GTAG_UART_RX : HM2_GTAG_PKTUART_RX);
+    const uint8_t receiver = gtag == HM2_GTAG_UART_TX ? HM2_GTAG_UART_RX : HM2_GTAG_PKTUART_RX;
+    struct sim_module *const rx = sim_module_of(card, receiver);
+    if (rx && !rx->advancing)
+        sim_sync(rx);
     return rx && rx->ops->serial_feed && unit < rx->md.instances ? rx->ops->serial_feed(rx, unit) : NULL;
 }
 

@@ -66,7 +66,8 @@ struct sim_module {
     struct sim_card *card;
     struct hm2_md md;
     void *state;
-    int64_t clk; /* edges before this have been made */
+    int64_t clk;    /* edges before this have been made */
+    bool advancing; /* it is being advanced together with others, and tells the world outside what happens */
 };
 
 /* Every model, NULL-terminated; a new one is one line in lib/sim/models.c. */

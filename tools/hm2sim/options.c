@@ -267,6 +267,32 @@ static int add_motor(struct reading *const r, const char *const value)
     return 0;
 }
 
+/* uart.N:TARGET or pktuart.N:TARGET */
+static int add_uart(struct reading *const r, const char *const value)
+{
+    const bool pkt = strncmp(value, "pktuart.", 8) == 0;
+    unsigned long unit;
+    const char *at;
+    if ((!pkt && strncmp(value, "uart.", 5) != 0) || !read_unsigned(value + (pkt ? 8 : 5), UINT8_MAX, &at, &unit) ||
+        *at != ':' || at[1] == '\0' || strlen(at + 1) >= UART_PATH)
+        return refuse(r, "--uart", value, "uart.N:TARGET or pktuart.N:TARGET, TARGET loop or a path");
+    if (r->card->uart_count == MAX_UARTS)
+        return refuse(r, "--uart", value, "at most 16 serial ports a card");
+    r->card->uarts[r->card->uart_count++] = (struct uart_option){
+        .gtag = pkt ? HM2_GTAG_PKTUART_TX : HM2_GTAG_UART_TX, .unit = (unsigned)unit, .target = at + 1};
+    return 0;
+}
+
+static int set_servo_card(struct reading *const r, const char *const value)
+{
+    unsigned long port;
+    if (!whole_unsigned(value, UINT8_MAX, &port))
+        return refuse(r, "--7i65", value, "the number of a buffered SPI port");
+    r->card->has_servo_card = true;
+    r->card->servo_port = (unsigned)port;
+    return 0;
+}
+
 /* ENCODER:COUNTS */
 static int add_index(struct reading *const r, const char *const value)
 {
@@ -460,6 +486,8 @@ enum {
     OPT_FOLLOW,
     OPT_MOTOR,
     OPT_INDEX,
+    OPT_UART,
+    OPT_SERVO_CARD,
     OPT_SWITCH,
     OPT_DRIVE,
     OPT_REMOTE,
@@ -492,6 +520,8 @@ static const struct option long_options[] = {
     {"follow", required_argument, NULL, OPT_FOLLOW},
     {"motor", required_argument, NULL, OPT_MOTOR},
     {"index", required_argument, NULL, OPT_INDEX},
+    {"uart", required_argument, NULL, OPT_UART},
+    {"7i65", required_argument, NULL, OPT_SERVO_CARD},
     {"switch", required_argument, NULL, OPT_SWITCH},
     {"drive", required_argument, NULL, OPT_DRIVE},
     {"remote", required_argument, NULL, OPT_REMOTE},
@@ -550,6 +580,8 @@ static void print_help(void)
           "  --follow ENC:STEPGEN[:NUM/DEN]  the encoder turns with the step generator\n"
           "  --motor ENC:PWMGEN:COUNTS       the encoder turns with a motor, COUNTS a second at full duty\n"
           "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
+          "  --uart PORT:TARGET  at uart.N or pktuart.N: loop, or the path of a terminal to make\n"
+          "  --7i65 PORT         a 7I65 with axes at a buffered SPI port\n"
           "  --switch IO:AXIS:POSITION:LEVELS  below the position of stepgen.N or encoder.N one level, then another\n"
           "  --drive IO:LEVELS[:MS]  0, 1, z (floating), h (pulled up), MS milliseconds each\n"
           "  --remote PORT:CHANNEL=CARD  a smart-serial card there. Cards:",
@@ -639,6 +671,10 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_motor(r, value);
     case OPT_INDEX:
         return add_index(r, value);
+    case OPT_UART:
+        return add_uart(r, value);
+    case OPT_SERVO_CARD:
+        return set_servo_card(r, value);
     case OPT_SWITCH:
         return add_switch(r, value);
     case OPT_REMOTE:

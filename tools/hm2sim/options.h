@@ -18,6 +18,8 @@
 #define MAX_REMOTES  32u
 #define FIELD_SIZE   24u /* of a remote's field name */
 #define PATTERN_BITS 64u
+#define MAX_UARTS    16u
+#define UART_PATH    256u
 
 struct wire {
     unsigned from, to;
@@ -70,6 +72,13 @@ struct pattern {
     int64_t step_ns;
 };
 
+/* A serial port and what hangs at it: "loop", or the path of a terminal to make. */
+struct uart_option {
+    uint8_t gtag;
+    unsigned unit;
+    const char *target;
+};
+
 struct card_options {
     const char *type;
     struct in_addr address;
@@ -87,6 +96,10 @@ struct card_options {
     struct pattern patterns[MAX_PATTERNS];
     struct remote_option remotes[MAX_REMOTES];
     struct servo servos[MAX_WIRES];
+    unsigned uart_count;
+    struct uart_option uarts[MAX_UARTS];
+    bool has_servo_card; /* a 7I65 at a buffered SPI port */
+    unsigned servo_port;
 };
 
 /* A remote of one processor on a pseudo-terminal. */

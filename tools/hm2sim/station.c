@@ -13,6 +13,7 @@
 #include "remotes.h"
 
 #define MAX_FIRMWARE_BYTES (1u << 20)
+#define PEER_STEP_NS       1000000
 #define WIRED_STEP_NS \
     5000000 /* edges on wires and of switches are made at least this often, not all at the next packet */
 
@@ -75,6 +76,7 @@ void station_receive(struct station *const s, const int64_t now_ns)
     s->requests++;
     drive_patterns(s, now_ns); /* what was due before it came has happened, whichever the loop looked at first */
     press_switches(s, now_ns);
+    peers_run(&s->peers, now_ns);
     sim_net_arrive(s->net, now_ns, client_number(&from), data, (size_t)len);
 }
 
@@ -83,6 +85,7 @@ void station_run(struct station *const s, const int64_t now_ns)
     drive_patterns(s, now_ns);
     sim_net_sleep_until(s->net, now_ns);
     press_switches(s, now_ns);
+    peers_run(&s->peers, now_ns);
 }
 
 int64_t station_next_ns(const struct station *const s)
@@ -93,6 +96,10 @@ int64_t station_next_ns(const struct station *const s)
             next_ns = s->pattern_due_ns[i];
     if (s->options->wire_count > 0 || s->options->switch_count > 0) {
         const int64_t step_ns = link_now_ns(sim_net_link(s->net)) + WIRED_STEP_NS;
+        next_ns = step_ns < next_ns ? step_ns : next_ns;
+    }
+    if (peers_exist(&s->peers)) {
+        const int64_t step_ns = link_now_ns(sim_net_link(s->net)) + PEER_STEP_NS;
         next_ns = step_ns < next_ns ? step_ns : next_ns;
     }
     return next_ns;
@@ -187,6 +194,8 @@ int station_open(struct station *const s, const struct options *const options, c
     if (!err)
         err = axes_connect(&s->axes, card, s->card, diag);
     if (!err)
+        err = peers_connect(&s->peers, card, s->card, diag);
+    if (!err)
         err = open_socket(card->address, card->port, &s->socket, &s->address, diag);
     if (!err)
         err = open_socket(card->address, 0, &s->foreign_socket, &unused, diag);
@@ -203,6 +212,7 @@ void station_close(struct station *const s)
         close(s->socket);
     if (s->foreign_socket >= 0)
         close(s->foreign_socket);
+    peers_close(&s->peers);
     sim_net_free(s->net);
     sim_card_free(s->card);
     flash_close(&s->flash);
@@ -237,4 +247,5 @@ void station_print_stats(const struct station *const s)
     if (t.unheard > 0)
         printf("%s: unheard while frozen %" PRIu64 "\n", name, t.unheard);
     axes_print(&s->axes, name);
+    peers_print(&s->peers, name);
 }

@@ -4,12 +4,14 @@
 #define HM2SIM_STATION_H
 
 #include "axes.h"
+#include "peers.h"
 
 struct station {
     const struct card_options *options;
     struct sim_card *card;
     struct axes axes;
     struct flash_file flash;
+    struct peers peers;
     struct sim_net *net;
     int socket, foreign_socket; /* -1 = not open */
     struct sockaddr_in address;

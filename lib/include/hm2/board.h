@@ -75,6 +75,14 @@ HM2_API void hm2_board_read(struct hm2_board *board, int64_t period_ns);
 HM2_API void hm2_board_write(struct hm2_board *board, int64_t period_ns);
 HM2_API bool hm2_board_request_outstanding(const struct hm2_board *board);
 
+/* Add to what travels in every cycle after set-up (hm2/bspi.h, hm2/serial.h): between begin and end no function of the
+ * cycle may run; a request that is outstanding is given up. end lays the packets out again: when it fails, with the
+ * reason in diag, the card can only be stopped. */
+HM2_API void hm2_board_change_begin(struct hm2_board *board);
+HM2_API int HM2_MUST_CHECK hm2_board_change_end(struct hm2_board *board, struct hm2_diag *diag);
+/* The module of this kind that a card in use has, or NULL. For lib/module. */
+HM2_API struct hm2_module *hm2_board_module(struct hm2_board *board, uint8_t gtag);
+
 /* ---- service: an identified card that is not set up ----------------------------------------------------------- */
 
 struct sslbp_port;

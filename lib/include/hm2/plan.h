@@ -51,7 +51,7 @@ enum hm2_rank { HM2_RANK_FIRST = 0, HM2_RANK_EARLY = 1, HM2_RANK_NORMAL = 2, HM2
 /* A run of 32-bit registers inside a cyclic packet. Lives in its module's memory and must not move. */
 struct hm2_window {
     uint8_t *bytes;   /* word 0 inside the packet; valid after freeze */
-    uint8_t *address; /* 16-bit address field of its command inside the request, for windows added with movable */
+    uint8_t *address; /* 16-bit address field of its command, for queues and windows added with movable */
     uint16_t words;
 };
 
@@ -105,6 +105,15 @@ HM2_API int HM2_MUST_CHECK hm2_plan_add_read_movable(struct hm2_plan *plan, stru
                                                      struct hm2_diag *diag);
 HM2_API int HM2_MUST_CHECK hm2_plan_add_write(struct hm2_plan *plan, struct hm2_window *window, enum hm2_rank rank,
                                               uint16_t address, unsigned words, struct hm2_diag *diag);
+/* The same for words that all go to one register, or come from one, in order: FIFOs. Queues are never merged, come
+ * behind everything else and keep the order in which they were added, so a packet carries out what was arranged. The
+ * address may change from cycle to cycle, which makes a fixed list skip: reads of a register without side effects, and
+ * writes to HM2_PLAN_NOWHERE, do nothing. */
+#define HM2_PLAN_NOWHERE 0x0100u /* the cookie is read-only (register map 1.2) */
+HM2_API int HM2_MUST_CHECK hm2_plan_add_queue_read(struct hm2_plan *plan, struct hm2_window *window, uint16_t address,
+                                                   unsigned words, struct hm2_diag *diag);
+HM2_API int HM2_MUST_CHECK hm2_plan_add_queue_write(struct hm2_plan *plan, struct hm2_window *window, uint16_t address,
+                                                    unsigned words, struct hm2_diag *diag);
 /* Add 1..127 set-up registers (flags: enum hm2_section_flags). They are zero, and will be sent so when nothing else is
  * stored before the first write, unless HM2_SECTION_ON_DEMAND. */
 HM2_API int HM2_MUST_CHECK hm2_plan_add_setup(struct hm2_plan *plan, struct hm2_section *section, enum hm2_rank rank,
@@ -112,6 +121,11 @@ HM2_API int HM2_MUST_CHECK hm2_plan_add_setup(struct hm2_plan *plan, struct hm2_
 /* Lay the packets out. HM2_ERR_NOSPACE, with the sizes in diag, when a datagram would become too long;
  * HM2_ERR_MISMATCH when two windows write the same register with the same rank. */
 HM2_API int HM2_MUST_CHECK hm2_plan_freeze(struct hm2_plan *plan, struct hm2_diag *diag);
+
+/* After freeze: windows and sections can be added once more, then freeze again. Nothing may use the plan in between; a
+ * request that is outstanding is given up. Words in windows and what is known of the sections stay. When the second
+ * freeze fails, no cycle can be run any more. */
+HM2_API void hm2_plan_reopen(struct hm2_plan *plan);
 
 /* Store a word; a section that is not on demand becomes dirty when the word differs from what it held. From
  * hm2_plan_add_setup() on, also before freeze. word < section->words. */

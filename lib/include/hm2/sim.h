@@ -131,6 +131,21 @@ HM2_API int HM2_MUST_CHECK sim_card_serial(struct sim_card *card, uint8_t gtag, 
 HM2_API size_t sim_card_serial_put(struct sim_card *card, uint8_t gtag, unsigned unit, const uint8_t *bytes,
                                    size_t len);
 
+/* ---- 7I65 ---------------------------------------------------------------------------------------------------------
+ */
+
+#define SIM_7I65_CHANNELS 8u
+
+/* An octal analog servo card behind a buffered SPI port of the card. It takes the card's edge callback
+ * (sim_card_on_edge()), so there is one for a card. */
+struct sim_7i65;
+HM2_API int HM2_MUST_CHECK sim_7i65_new(struct sim_7i65 **made, struct sim_card *card, unsigned unit);
+HM2_API void sim_7i65_free(struct sim_7i65 *daughter); /* before the card */
+HM2_API double sim_7i65_output_volts(const struct sim_7i65 *daughter, unsigned channel);
+HM2_API void sim_7i65_set_input_volts(struct sim_7i65 *daughter, unsigned channel, double volts);
+HM2_API void sim_7i65_set_inputs(struct sim_7i65 *daughter, uint8_t inputs); /* bits 0..3 */
+HM2_API uint8_t sim_7i65_enables(const struct sim_7i65 *daughter);
+
 /* ---- packets ---------------------------------------------------------------------------------------------------- */
 
 /* Card time that belongs to a time of the outside world; the first packet sets it when nobody did. */

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Serial ports of a card: UART (tags 09, 0A) and PktUART (1B, 1C; register map 3.12, 3.13 and Annex D), as streams of
+ * bytes.
+ *
+ * A port that is open takes part in every cycle, within lists of fixed length: nothing is read or written besides.
+ * Bytes wait in rings between the cycle and one other thread, which puts and gets without a lock. Nothing is lost in
+ * silence: a full ring takes no more, and what the firmware or a lost packet lost is counted.
+ */
+#ifndef HM2_SERIAL_H
+#define HM2_SERIAL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hm2/board.h>
+
+struct hm2_serial;
+
+enum hm2_serial_kind { HM2_SERIAL_UART, HM2_SERIAL_PKTUART };
+enum hm2_parity { HM2_PARITY_NONE, HM2_PARITY_EVEN, HM2_PARITY_ODD };
+enum hm2_serial_drive { HM2_DRIVE_AUTO, HM2_DRIVE_ON, HM2_DRIVE_OFF };
+
+struct hm2_serial_settings {
+    uint32_t baud;                     /* > 0, at most a quarter of the module's clock */
+    enum hm2_parity parity;            /* PktUART with version 1 or later only */
+    enum hm2_serial_drive drive;       /* AUTO: the transmitter is enabled while it sends */
+    bool mask;                         /* the receiver ignores what the own transmitter sends */
+    unsigned drive_delay_clk;          /* 0..15, from enable to the start bit; PktUART version 0 with AUTO: at most 1 */
+    unsigned tx_gap_bits, rx_gap_bits; /* PktUART, 11..255: between frames. The receiver's counts on during a byte */
+};
+
+/* What was lost, and why. */
+struct hm2_serial_counts {
+    uint32_t rx_bytes, tx_bytes;
+    uint32_t rx_errors;    /* false starts, missing stop bits, wrong parity */
+    uint32_t rx_overruns;  /* the card's buffers ran over, or no longer made sense, and were cleared */
+    uint32_t rx_uncertain; /* bytes that the card had given when the reply with them was lost */
+    uint32_t tx_uncertain; /* bytes of which nobody knows whether they were sent, for the same reason */
+};
+
+/* Port `unit` of a card that is set up, or NULL when it has none or the configuration does not use it. */
+HM2_API struct hm2_serial *hm2_serial_port(struct hm2_board *board, enum hm2_serial_kind kind, unsigned unit);
+/* Take part in the cycle from now on; between hm2_board_change_begin() and hm2_board_change_end(). Once more does
+ * nothing. */
+HM2_API int HM2_MUST_CHECK hm2_serial_open(struct hm2_serial *port, struct hm2_diag *diag);
+/* Not while a cycle runs. HM2_ERR_RANGE with the reason. What the card's buffers hold is dropped. */
+HM2_API int HM2_MUST_CHECK hm2_serial_set(struct hm2_serial *port, const struct hm2_serial_settings *settings,
+                                          struct hm2_diag *diag);
+/* By one thread besides the cycle: bytes taken or given. Realtime safe. */
+HM2_API size_t hm2_serial_put(struct hm2_serial *port, const uint8_t *bytes, size_t len);
+HM2_API size_t hm2_serial_get(struct hm2_serial *port, uint8_t *bytes, size_t size);
+/* Bytes that were put and are not yet on their way. */
+HM2_API size_t hm2_serial_waiting(const struct hm2_serial *port);
+HM2_API struct hm2_serial_counts hm2_serial_counts(const struct hm2_serial *port);
+
+#endif

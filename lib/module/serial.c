@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "serial.h"
+
+#include <string.h>
+
+/* ---- rings ----------------------------------------------------------------------------------------------------------
+ */
+
+static size_t smaller(const size_t a, const size_t b)
+{
+    return a < b ? a : b;
+}
+
+size_t ring_put(struct ring *const ring, const uint8_t *const bytes, const size_t len)
+{
+    const unsigned head = atomic_load_explicit(&ring->head, memory_order_relaxed);
+    const size_t taken = smaller(len, RING_BYTES - ring_used(ring));
+    for (size_t i = 0; i < taken; i++)
+        ring->byte[(head + i) % RING_BYTES] = bytes[i];
+    atomic_store_explicit(&ring->head, head + (unsigned)taken, memory_order_release);
+    return taken;
+}
+
+size_t ring_get(struct ring *const ring, uint8_t *const bytes, const size_t size)
+{
+    const unsigned tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
+    const size_t given = smaller(size, ring_used(ring));
+    for (size_t i = 0; i < given; i++)
+        bytes[i] = ring->byte[(tail + i) % RING_BYTES];
+    atomic_store_explicit(&ring->tail, tail + (unsigned)given, memory_order_release);
+    return given;
+}
+
+/* ---- queues ---------------------------------------------------------------------------------------------------------
+ */
+
+int queue_add_reads(struct queue *const queue, struct hm2_plan *const plan, const unsigned blocks,
+                    struct hm2_diag *const diag)
+{
+    int err = 0;
+    queue->blocks = blocks;
+    for (unsigned i = 0; i < blocks && !err; i++)
+        err = hm2_plan_add_queue_read(plan, &queue->block[i], queue->nowhere, 1u << i, diag);
+    return err;
+}
+
+int queue_add_writes(struct queue *const queue, struct hm2_plan *const plan, const unsigned blocks,
+                     struct hm2_diag *const diag)
+{
+    int err = 0;
+    queue->blocks = blocks;
+    for (unsigned i = 0; i < blocks && !err; i++)
+        err = hm2_plan_add_queue_write(plan, &queue->block[i], queue->nowhere, 1u << i, diag);
+    return err;
+}
+
+void queue_aim(struct queue *const queue, const unsigned words)
+{
+    for (unsigned i = 0; i < queue->blocks; i++)
+        hm2_put_le16(queue->block[i].address, words >> i & 1u ? queue->fifo : queue->nowhere);
+}
+
+struct queue_place queue_place(struct queue *const queue, const unsigned words, unsigned n)
+{
+    unsigned i = 0;
+    for (; i + 1u < queue->blocks; i++) {
+        const unsigned size = words & 1u << i;
+        if (n < size)
+            break;
+        n -= size;
+    }
+    return (struct queue_place){&queue->block[i], n};
+}
+
+/* ---- ports ----------------------------------------------------------------------------------------------------------
+ */
+
+struct hm2_serial *hm2_serial_port(struct hm2_board *const board, const enum hm2_serial_kind kind, const unsigned unit)
+{
+    const bool uart = kind == HM2_SERIAL_UART;
+    const struct hm2_module *const module = hm2_board_module(board, uart ? HM2_GTAG_UART_TX : HM2_GTAG_PKTUART_TX);
+    if (!module || !module->context || unit >= module->instances)
+        return NULL;
+    return uart ? uart_port(module, unit) : pktuart_port(module, unit);
+}
+
+int hm2_serial_open(struct hm2_serial *const port, struct hm2_diag *const diag)
+{
+    const int err = port->open ? 0 : port->ops->open(port, diag);
+    port->open = port->open || err == 0;
+    return err;
+}
+
+int hm2_serial_set(struct hm2_serial *const port, const struct hm2_serial_settings *const settings,
+                   struct hm2_diag *const diag)
+{
+    if (!port->open)
+        return hm2_diag_add(diag, HM2_ERR_STATE, "a serial port is set after it has been opened");
+    int err = serial_check(port, settings, diag);
+    if (!err)
+        err = port->ops->set(port, settings, diag);
+    if (!err)
+        port->settings = *settings;
+    return err;
+}
+
+int serial_check(const struct hm2_serial *const port, const struct hm2_serial_settings *const settings,
+                 struct hm2_diag *const diag)
+{
+    if (settings->baud == 0 || settings->baud > port->clock_hz / 4.0)
+        return hm2_diag_add(diag, HM2_ERR_RANGE, "%u baud found, 1 to %.0f expected", settings->baud,
+                            port->clock_hz / 4.0);
+    if (settings->drive_delay_clk > 15)
+        return hm2_diag_add(diag, HM2_ERR_RANGE, "a drive delay of %u clocks found, 0 to 15 expected",
+                            settings->drive_delay_clk);
+    return 0;
+}
+
+/* rate = baud * 2^bits / clock, rounded to the nearest: LinuxCNC's driver rounds down. */
+uint32_t serial_rate(const struct hm2_serial *const port, const uint32_t baud, const unsigned bits)
+{
+    const double rate = (double)baud * (double)(1u << bits) / port->clock_hz + 0.5;
+    return rate < 1.0 ? 1u : (uint32_t)rate;
+}
+
+size_t hm2_serial_put(struct hm2_serial *const port, const uint8_t *const bytes, const size_t len)
+{
+    return ring_put(&port->tx, bytes, len);
+}
+
+size_t hm2_serial_get(struct hm2_serial *const port, uint8_t *const bytes, const size_t size)
+{
+    return ring_get(&port->rx, bytes, size);
+}
+
+size_t hm2_serial_waiting(const struct hm2_serial *const port)
+{
+    return ring_used(&port->tx);
+}
+
+struct hm2_serial_counts hm2_serial_counts(const struct hm2_serial *const port)
+{
+    return port->counts;
+}

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* A started board on a simulated card with the firmware of a recording, in virtual time. */
+#ifndef SIM_BENCH_H
+#define SIM_BENCH_H
+
+#include <hm2/board.h>
+#include <hm2/sim.h>
+
+#define BENCH_PERIOD_NS 1000000
+
+struct sim_bench {
+    struct sim_card *card;
+    struct sim_net *net;
+    struct hm2_board *board;
+    struct hm2_plain_binder *plain;
+    struct hm2_diag diag;
+    int64_t now_ns;
+};
+
+/* firmware: of replay_firmware(). Fails the test when something does not work. */
+struct sim_bench *sim_bench_new(const char *profile, const char *firmware, const char *config);
+void sim_bench_free(struct sim_bench *bench);
+/* Read, write, and the rest of the period. */
+void sim_bench_cycle(struct sim_bench *bench);
+
+#endif

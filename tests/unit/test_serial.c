@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* UART and PktUART as byte streams, looped back on simulated cards, in virtual time. */
+#include "unit.h"
+
+#include <hm2/serial.h>
+
+#include "sim_bench.h"
+
+struct loop {
+    const char *firmware;
+    enum hm2_serial_kind kind;
+    uint8_t gtag;
+    uint32_t baud;
+    enum hm2_parity parity;
+    enum hm2_serial_drive drive;
+    size_t bytes;
+};
+
+struct peer {
+    struct sim_bench *bench;
+    uint8_t gtag;
+};
+
+/* The world outside sends back what it hears. */
+static void echo(void *context, uint8_t byte)
+{
+    const struct peer *const peer = context;
+    assert_int_equal(sim_card_serial_put(peer->bench->card, peer->gtag, 0, &byte, 1), 1);
+}
+
+static uint8_t pattern(const size_t n)
+{
+    return (uint8_t)(n * 31u + n / 251u);
+}
+
+static struct hm2_serial *open_port(struct sim_bench *bench, const struct loop *loop)
+{
+    const struct hm2_serial_settings settings = {
+        .baud = loop->baud, .parity = loop->parity, .drive = loop->drive, .tx_gap_bits = 24, .rx_gap_bits = 14};
+    struct hm2_serial *const port = hm2_serial_port(bench->board, loop->kind, 0);
+    assert_non_null(port);
+    hm2_board_change_begin(bench->board);
+    assert_int_equal(hm2_serial_open(port, &bench->diag), 0);
+    assert_int_equal(hm2_board_change_end(bench->board, &bench->diag), 0);
+    if (hm2_serial_set(port, &settings, &bench->diag) != 0)
+        fail_msg("%s", bench->diag.text);
+    return port;
+}
+
+static size_t run_loop(const struct loop *loop, struct hm2_serial_counts *counts)
+{
+    struct sim_bench *const bench = sim_bench_new("7i80hd-16", loop->firmware, "");
+    struct hm2_serial *const port = open_port(bench, loop);
+    struct peer peer = {bench, loop->gtag};
+    size_t put = 0, got = 0, idle = 0;
+    assert_int_equal(sim_card_serial(bench->card, loop->gtag, 0, echo, &peer), 0);
+    while (got < loop->bytes && idle < 200) {
+        uint8_t bytes[512];
+        size_t n = 0;
+        for (; n < sizeof bytes && put + n < loop->bytes; n++)
+            bytes[n] = pattern(put + n);
+        put += hm2_serial_put(port, bytes, n);
+        sim_bench_cycle(bench);
+        n = hm2_serial_get(port, bytes, sizeof bytes);
+        idle = n ? 0 : idle + 1;
+        for (size_t i = 0; i < n; i++, got++)
+            if (bytes[i] != pattern(got))
+                fail_msg("byte %zu: got %02x, expected %02x", got, bytes[i], pattern(got));
+    }
+    *counts = hm2_serial_counts(port);
+    sim_bench_free(bench);
+    return got;
+}
+
+static void a_loop_brings_every_byte_back(void **state)
+{
+    static const struct loop rows[] = {
+        {"SVUA8_8_72", HM2_SERIAL_UART, HM2_GTAG_UART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000},
+        {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000},
+        {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 30000},
+        {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_ODD, HM2_DRIVE_AUTO, 6000},
+        {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_EVEN, HM2_DRIVE_ON, 30000},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct hm2_serial_counts counts;
+        const size_t got = run_loop(&rows[i], &counts);
+        if (got != rows[i].bytes || counts.rx_errors || counts.rx_overruns || counts.rx_uncertain)
+            fail_msg("row %zu: %zu of %zu bytes, errors %u, overruns %u, uncertain %u, sent %u", i, got, rows[i].bytes,
+                     counts.rx_errors, counts.rx_overruns, counts.rx_uncertain, counts.tx_bytes);
+    }
+}
+
+static void settings_that_the_firmware_cannot_keep_are_refused(void **state)
+{
+    static const struct loop old = {
+        "PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 9600, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 0};
+    (void)state;
+    struct sim_bench *const bench = sim_bench_new("7i80hd-16", old.firmware, "");
+    struct hm2_serial *const port = open_port(bench, &old);
+    struct hm2_serial_settings s = {.baud = 9600, .tx_gap_bits = 24, .rx_gap_bits = 14, .parity = HM2_PARITY_ODD};
+    assert_int_equal(hm2_serial_set(port, &s, &bench->diag), HM2_ERR_RANGE);
+    s.parity = HM2_PARITY_NONE;
+    s.drive_delay_clk = 2;
+    assert_int_equal(hm2_serial_set(port, &s, &bench->diag), HM2_ERR_RANGE);
+    s.drive_delay_clk = 0;
+    s.rx_gap_bits = 10;
+    assert_int_equal(hm2_serial_set(port, &s, &bench->diag), HM2_ERR_RANGE);
+    s.rx_gap_bits = 14;
+    s.baud = 0;
+    assert_int_equal(hm2_serial_set(port, &s, &bench->diag), HM2_ERR_RANGE);
+    s.baud = 9600;
+    assert_int_equal(hm2_serial_set(port, &s, &bench->diag), 0);
+    sim_bench_free(bench);
+}
+
+static void a_full_ring_takes_no_more(void **state)
+{
+    static const struct loop off = {
+        "PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 9600, HM2_PARITY_NONE, HM2_DRIVE_OFF, 0};
+    (void)state;
+    static const uint8_t bytes[1000];
+    struct sim_bench *const bench = sim_bench_new("7i80hd-16", off.firmware, "");
+    struct hm2_serial *const port = open_port(bench, &off);
+    size_t taken = 0;
+    for (unsigned i = 0; i < 20; i++)
+        taken += hm2_serial_put(port, bytes, sizeof bytes);
+    assert_int_equal(taken, 8192);
+    sim_bench_cycle(bench);
+    assert_int_equal(hm2_serial_waiting(port), 8192);
+    sim_bench_free(bench);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_loop_brings_every_byte_back),
+        cmocka_unit_test(settings_that_the_firmware_cannot_keep_are_refused),
+        cmocka_unit_test(a_full_ring_takes_no_more),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
