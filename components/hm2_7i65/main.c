@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * mesa_7i65: the octal analog servo card 7I65 behind a buffered SPI port, with the pins and parameters of LinuxCNC's
- * component of this name.
+ * hm2_7i65: the octal analog servo card 7I65 behind a buffered SPI port, with the pins and parameters of LinuxCNC's
+ * mesa_7i65, whose file it must not replace.
  *
- *     loadrt mesa_7i65 bspi_chans=hm2_7i80.0.bspi.0[,...]
+ *     loadrt hm2_7i65 bspi_chans=hm2_7i80.0.bspi.0[,...]
  *
  * It runs within the functions of the card: read() below is called after each reply, and what it stores goes out with
  * the next write. Two quad DACs (AD5754), an ADC with a sequencer (AD7329) and a CPLD hang at the port.
@@ -170,7 +170,7 @@ static int bind(struct servo_card *const card, const unsigned number)
         err = hm2_bind_points(&hal.binder, channel_points, sizeof channel_points / sizeof channel_points[0],
                               &card->channel[i], prefix, i, &diag);
     if (err)
-        rtapi_print_msg(RTAPI_MSG_ERR, "mesa_7i65: %s\n", diag.text);
+        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_7i65: %s\n", diag.text);
     return err;
 }
 
@@ -226,13 +226,13 @@ static unsigned card_count;
 
 int rtapi_app_main(void)
 {
-    component_id = hal_init("mesa_7i65");
+    component_id = hal_init("hm2_7i65");
     if (component_id < 0)
         return component_id;
     hal_binder_init(&hal, component_id);
     int result = bspi_chans[0] && bspi_chans[0][0] ? 0 : -EINVAL;
     if (result)
-        rtapi_print_msg(RTAPI_MSG_ERR, "mesa_7i65: no port given: loadrt mesa_7i65 bspi_chans=hm2_7i80.0.bspi.0\n");
+        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_7i65: no port given: loadrt hm2_7i65 bspi_chans=hm2_7i80.0.bspi.0\n");
     for (card_count = 0; !result && card_count < MAX_CARDS && bspi_chans[card_count] && bspi_chans[card_count][0];
          card_count++)
         result = load_card(card_count);
