@@ -196,7 +196,7 @@ static void edge(void *const instance)
     }
     store(p, &before);
     serial_feed_step(&p->feed, &r->baud, 1);
-    p->rests = memcmp(&before, r, sizeof before) == 0 && line(p) == level;
+    p->rests = serial_rests(&before, r, sizeof before) && line(p) == level;
 }
 
 static const struct sim_stepper stepper = {quiet, skip, edge};

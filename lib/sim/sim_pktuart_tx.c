@@ -155,7 +155,7 @@ static void edge(void *const instance)
         t->delay = before.mode & MODE_DELAY;
     else if (before.delay > 0)
         t->delay--;
-    p->rests = memcmp(&before, t, sizeof before) == 0;
+    p->rests = serial_rests(&before, t, sizeof before);
 }
 
 static const struct sim_stepper stepper = {quiet, skip, edge};

@@ -118,7 +118,7 @@ static void tx_edge(void *const instance)
         t->delay = before.mode & TX_DELAY;
     else if (before.delay > 0)
         t->delay--;
-    p->rests = memcmp(&before, t, sizeof before) == 0;
+    p->rests = serial_rests(&before, t, sizeof before);
 }
 
 static const struct sim_stepper tx_stepper = {tx_quiet, tx_skip, tx_edge};
@@ -238,7 +238,7 @@ static void rx_edge(void *const instance)
     if (before.available && !srl_push(&r->fifo, before.sreg >> 1 & 0xFFu))
         r->mode |= RX_LOST;
     serial_feed_step(&p->feed, &r->baud, 1);
-    p->rests = memcmp(&before, r, sizeof before) == 0 && line(p) == level;
+    p->rests = serial_rests(&before, r, sizeof before) && line(p) == level;
 }
 
 static const struct sim_stepper rx_stepper = {rx_quiet, rx_skip, rx_edge};
