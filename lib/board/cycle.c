@@ -195,9 +195,9 @@ static void note_loss(struct hm2_board *const board)
 
 static void unpack_all(struct hm2_board *const board)
 {
-    call_all(&board->unpacks, board_cycle(board, board->request_ns, hm2_watchdog_bitten(board->watchdog)));
+    const bool bitten = hm2_watchdog_bitten(board->watchdog); /* as the cycle before has found */
+    call_all(&board->unpacks, board_cycle(board, board->request_ns, bitten));
     *board->points->data_age = 0;
-    const bool bitten = hm2_watchdog_bitten(board->watchdog);
     if (bitten || board->bitten)
         board_stay_bitten(board, bitten);
 }
