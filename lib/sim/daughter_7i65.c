@@ -35,7 +35,7 @@ struct sim_7i65 {
 
 static unsigned selected(const struct sim_7i65 *const s)
 {
-    return s->level[PIN_CS0] | s->level[PIN_CS0 + 1] << 1 | s->level[PIN_CS0 + 2] << 2;
+    return (unsigned)s->level[PIN_CS0] | (unsigned)s->level[PIN_CS0 + 1] << 1 | (unsigned)s->level[PIN_CS0 + 2] << 2;
 }
 
 static void show(struct sim_7i65 *const s, const int64_t clk)

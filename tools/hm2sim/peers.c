@@ -75,7 +75,7 @@ static void move_axes(struct peers *const peers, const int64_t now_ns)
     const double dt = (double)(now_ns - peers->position_ns) * 1e-9;
     peers->position_ns = now_ns;
     for (unsigned i = 0; peers->servo && i < SIM_7I65_CHANNELS; i++) {
-        const bool enabled = (sim_7i65_enables(peers->servo) >> i & 1u) != 0;
+        const bool enabled = ((unsigned)sim_7i65_enables(peers->servo) >> i & 1u) != 0;
         double *const at = &peers->position[i];
         *at += enabled ? sim_7i65_output_volts(peers->servo, i) * TURNS_PER_VOLT_S * dt : 0.0;
         *at = *at > SENSOR_VOLTS ? SENSOR_VOLTS : *at < -SENSOR_VOLTS ? -SENSOR_VOLTS : *at;
