@@ -176,7 +176,7 @@ static void edge(void *const instance)
     const struct rx before = *r;
     const bool level = line(p);
     const bool seen = filter(p, &before, level);
-    r->pipe = (uint8_t)((before.pipe << 1 | seen) & 3u);
+    r->pipe = (uint8_t)(((unsigned)before.pipe << 1 | seen) & 3u);
     r->push_data = r->push_count = r->clear_errors = false;
     r->baud.before = baud_high(&before.baud);
     if (before.go || before.gap_go)

@@ -223,7 +223,7 @@ static void rx_edge(void *const instance)
     struct rx *const r = &p->rx;
     const struct rx before = *r;
     const bool level = line(p);
-    r->pipe = (uint8_t)((before.pipe << 1 | level) & 3u);
+    r->pipe = (uint8_t)(((unsigned)before.pipe << 1 | level) & 3u);
     r->baud.before = baud_high(&before.baud);
     r->available = false;
     if (before.go) {
