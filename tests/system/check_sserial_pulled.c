@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * The cable of one of two smart-serial remotes is pulled under LinuxCNC: axes of the other go on, the loss is reported
+ * within three cycles, and the remote comes back by a person's hand or by auto-restart (tests/system/hal/pull-remote).
+ */
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "process.h"
+
+#define LIMIT_MS   90000
+#define CANNOT_RUN 77
+
+static struct process run;
+
+static void set(const char *const name, const char *const value)
+{
+    ck_assert_int_eq(setenv(name, value, 1), 0);
+}
+
+START_TEST(a_pulled_remote_stops_alone_is_reported_and_comes_back)
+{
+    static const char out[] = TEST_BUILD "/sserial-pulled";
+    static const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer",
+                                       TEST_BUILD,
+                                       out,
+                                       "7i96s_7i77d",
+                                       TEST_SOURCE "/tests/system/hal/sserial-pulled.hal",
+                                       "--remote",
+                                       "0:0=7i77",
+                                       "--remote",
+                                       "0:2=7i77-analog",
+                                       "--servo",
+                                       "0:0:1:AnalogOut0:100000:20",
+                                       "--servo",
+                                       "1:0:1:AnalogOut1:100000:20",
+                                       "--servo",
+                                       "2:0:1:AnalogOut2:100000:20",
+                                       "--servo",
+                                       "3:0:2:AnalogOut0:100000:20",
+                                       "--servo",
+                                       "4:0:2:AnalogOut1:100000:20",
+                                       "--servo",
+                                       "5:0:2:AnalogOut2:100000:20",
+                                       NULL};
+    const char *skip;
+    if (TEST_SANITIZED) {
+        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+        return;
+    }
+    (void)mkdir(out, 0755);
+    set("PEER_DRIVER", "hm2_lbp16");
+    set("PEER_CONFIG", "num_encoders=8 num_stepgens=5 sserial_port_0=000xxxxx");
+    set("PEER_CARD", "hm2_7i96s.0");
+    set("PEER_MODULES", TEST_BUILD "/linuxcnc");
+    set("PEER_TIMEOUT", "80");
+    process_run(&run, argv, LIMIT_MS);
+    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
+        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
+        return;
+    }
+    if (run.status != 0 || !process_wait_line(&run, "ok all", 0, NULL)) {
+        printf("%s\n", run.text);
+        fflush(stdout);
+        ck_abort_msg("not what should happen to a pulled remote, status %d", run.status);
+    }
+}
+END_TEST
+
+int main(void)
+{
+    Suite *const suite = suite_create("sserial pulled");
+    TCase *const tests = tcase_create("LinuxCNC");
+    tcase_set_timeout(tests, 100);
+    tcase_add_test(tests, a_pulled_remote_stops_alone_is_reported_and_comes_back);
+    suite_add_tcase(suite, tests);
+    SRunner *const runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    const int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed > 0;
+}
