@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* hm2flash as a program, on simulated cards over UDP: what it prints, does, refuses, and its exit status. */
 #include <check.h>
+#include <pty.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "flash_rig.h"
@@ -166,6 +168,49 @@ START_TEST(sets_and_reads_settings_and_registers)
 }
 END_TEST
 
+/* --reload of card 0 at a terminal, where this is typed; its exit status. The time limit of the test bounds it. */
+static int reload_at_terminal(const char *const typed)
+{
+    int terminal, status;
+    char text[512];
+    const pid_t pid = forkpty(&terminal, NULL, NULL, NULL);
+    ck_assert_int_ge(pid, 0);
+    if (pid == 0) {
+        execl(process_built("hm2flash"), "hm2flash", "--addr", sim.address[0], "--reload", (char *)NULL);
+        _exit(127);
+    }
+    ck_assert_int_eq(write(terminal, typed, strlen(typed)), (ssize_t)strlen(typed));
+    while (read(terminal, text, sizeof text) > 0)
+        ;
+    close(terminal);
+    ck_assert_int_eq(waitpid(pid, &status, 0), pid);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/* H19 */
+START_TEST(asks_before_outputs_let_go)
+{
+    const char *const address = sim.address[0], *const image = image_7i96s(1);
+    run(DONE, "--addr", address, "--wpo", "0x1100=0x21");
+    run(REFUSED, "--addr", address, "--reload");
+    printed("2 pins of the card are outputs");
+    printed("then add --yes");
+    run(REFUSED, "--addr", address, "--write", image, "--reload");
+    ck_assert_ptr_null(strstr(tool.text, "Erasing"));
+    ck_assert_int_eq(reload_at_terminal("n\n"), REFUSED);
+    ck_assert_int_eq(reload_at_terminal("\n"), REFUSED);
+    ck_assert_uint_eq(simulator_read(&sim, 0, 0x1100), 0x21);
+    run(DONE, "--addr", address, "--write", image); /* leaves the outputs as they are */
+    ck_assert_uint_eq(simulator_read(&sim, 0, 0x1100), 0x21);
+    ck_assert_int_eq(reload_at_terminal("y\n"), DONE);
+    ck_assert_uint_eq(simulator_read(&sim, 0, 0x1100), 0);
+    run(DONE, "--addr", address, "--reload"); /* nothing is an output any more */
+    run(REFUSED, "--addr", address, "--enable-all-mod");
+    run(DONE, "--addr", address, "--enable-all-mod", "--yes");
+    run(DONE, "--addr", address, "--reload", "--yes");
+}
+END_TEST
+
 START_TEST(works_on_many_cards_and_finds_them)
 {
     char both[40], line[96];
@@ -206,6 +251,7 @@ int main(void)
     tcase_add_test(tests, refuses_before_it_erases);
     tcase_add_test(tests, backs_up_and_restores);
     tcase_add_test(tests, sets_and_reads_settings_and_registers);
+    tcase_add_test(tests, asks_before_outputs_let_go);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
     suite_add_tcase(suite, tests);

@@ -101,11 +101,8 @@ int do_enable_all(struct cli *const cli, const char *const arg)
     const int status = check_alone(cli);
     if (status != DONE)
         return status;
-    if (!cli->confirm_outputs)
-        return complain(cli, REFUSED,
-                        "this switches on every output that a module has, whatever is connected to it. If "
-                        "that is safe, add --confirm outputs");
-    return set_ports(cli, true);
+    (void)complain(cli, 0, "this switches on every output that a module has, whatever is connected to it");
+    return confirmed(cli) ? set_ports(cli, true) : REFUSED;
 }
 
 int do_safe_io(struct cli *const cli, const char *const arg)
