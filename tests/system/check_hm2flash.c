@@ -211,6 +211,42 @@ START_TEST(asks_before_outputs_let_go)
 }
 END_TEST
 
+/* H4: in the current folder under a name of its own, or where --backup-to says; without it nothing is written. */
+START_TEST(backs_up_before_the_fallback_image_is_replaced)
+{
+    const char *const address = sim.address[1], *const kept = flash_rig_path("kept.bin");
+    const char *const image = flash_rig_image("7i93_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 3});
+    const char *const fallback =
+        flash_rig_image("7i93_fallback.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 4});
+    const char *const other =
+        flash_rig_image("7i93_fallback_2.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 5});
+#define WRITE(file) "--addr", address, "--fallback", "--write", file, "--confirm", "fallback"
+    run(DONE, "--addr", address, "--write", image);
+    ck_assert_ptr_null(strstr(tool.text, "backup"));
+    ck_assert_int_eq(chdir("/proc"), 0); /* where nobody makes a file */
+    run(REFUSED, WRITE(fallback));
+    printed("without a backup the flash is not written, and nothing was changed");
+    ck_assert_ptr_null(strstr(tool.text, "Erasing"));
+    run(DONE, WRITE(fallback), "--dry-run");
+    run(DONE, WRITE(fallback), "--backup-to", kept);
+    printed("FLASH memory backup file '");
+    run(FAILED, "--addr", address, "--verify", kept); /* it holds what was there before */
+    run(REFUSED, WRITE(other), "--backup-to", kept);  /* and is not overwritten */
+    ck_assert_int_eq(chdir(flash_rig_path(".")), 0);
+    run(DONE, WRITE(other));
+    printed("Used auto naming backup file: '7I93_flash_backup_");
+    run(DONE, WRITE(other)); /* the same again changes nothing */
+    ck_assert_ptr_null(strstr(tool.text, "backup"));
+    run(REFUSED, "--addr", address, "--restore-flash", kept);
+    printed("--confirm fallback");
+    run(DONE, "--addr", address, "--restore-flash", kept, "--confirm", "fallback", "--backup-to",
+        flash_rig_path("second.bin"));
+    run(DONE, "--addr", address, "--verify", kept);
+#undef WRITE
+    ck_assert_int_eq(chdir("/"), 0);
+}
+END_TEST
+
 START_TEST(works_on_many_cards_and_finds_them)
 {
     char both[40], line[96];
@@ -252,6 +288,7 @@ int main(void)
     tcase_add_test(tests, backs_up_and_restores);
     tcase_add_test(tests, sets_and_reads_settings_and_registers);
     tcase_add_test(tests, asks_before_outputs_let_go);
+    tcase_add_test(tests, backs_up_before_the_fallback_image_is_replaced);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
     suite_add_tcase(suite, tests);

@@ -146,6 +146,31 @@ static void json_plan(const struct cli *const cli, const struct flash_job *const
     json_end(cli);
 }
 
+/* Whether anything of what rescues the card, fallback image or boot block, is about to change. */
+static bool changes_rescue(const struct cli *const cli, const struct flash_plan *const plan)
+{
+    const unsigned user = cli->info->chip->bytes / 2 / FLASH_SECTOR_BYTES;
+    for (unsigned s = 0; s < user; s++)
+        if (plan->state[s] > FLASH_SECTOR_SAME)
+            return true;
+    return false;
+}
+
+/* What rescues the card is never written without a copy of what was there (H4): in the current folder, unless the
+ * command line names a place. */
+static int back_up_before(struct cli *const cli, const struct flash_job *const job)
+{
+    const struct flash_plan *const plan = flash_job_plan(job);
+    const bool allowed = cli->confirm_fallback || cli->fix_boot_block; /* otherwise the job refuses by itself */
+    if (plan->to_write == 0 || (!cli->backup_to && !(allowed && changes_rescue(cli, plan))))
+        return DONE;
+    const int status = backup_to(cli, cli->backup_to ? cli->backup_to : ".");
+    return status == DONE ? DONE
+                          : complain(cli, status == LOST ? LOST : REFUSED,
+                                     "without a backup the flash is not written, and nothing was changed: give a place "
+                                     "for it with --backup-to");
+}
+
 /* ---- write
  * ------------------------------------------------------------------------------------------------------------ */
 
@@ -169,7 +194,9 @@ static int write_job(struct cli *const cli, struct flash_job *const job)
         return DONE;
     }
     const bool nothing = flash_job_plan(job)->to_write == 0;
-    status = run(cli, job, &outcome);
+    status = back_up_before(cli, job);
+    if (status == DONE)
+        status = run(cli, job, &outcome);
     if (status != DONE)
         return status;
     if (flash_job_plan(job)->boot_block)
@@ -197,10 +224,6 @@ static int write_image(struct cli *const cli, const char *const path, const uint
         return status;
     const struct flash_options options = options_of(cli, path);
     announce(cli, bytes, len, options.area);
-    if (cli->backup_to && !cli->dry_run)
-        status = backup_to(cli, cli->backup_to);
-    if (status != DONE)
-        return status;
     const int err = flash_job_write(&job, cli->card, &image, &options, &cli->diag);
     if (err < 0)
         return report(cli, err);
@@ -292,8 +315,11 @@ static void name_backup(const struct cli *const cli, const char *const where, ch
     }
     (void)localtime_r(&now, &local);
     (void)strftime(stamp, sizeof stamp, "%d%m%y_%H%M%S", &local);
-    char name[128];
-    snprintf(name, sizeof name, "%s_flash_backup_%s.bin", card_name(cli), stamp);
+    char name[128], which[16] = "";
+    const uint8_t *const m = cli->info->mac;
+    if (cli->many) /* several of a kind must not meet in one file */
+        snprintf(which, sizeof which, "_%02X%02X%02X%02X%02X%02X", m[0], m[1], m[2], m[3], m[4], m[5]);
+    snprintf(name, sizeof name, "%s_flash_backup_%s%s.bin", card_name(cli), stamp, which);
     snprintf(path, size, "%s%s%s", where, where[strlen(where) - 1] == '/' ? "" : "/", name);
     say(cli, "Used auto naming backup file: '%s'\n", name);
 }
@@ -393,7 +419,9 @@ static int restore_dump(struct cli *const cli, const char *const path, const uin
     if (status == DONE && cli->dry_run)
         json_plan(cli, job);
     if (status == DONE && !cli->dry_run) {
-        status = run(cli, job, &outcome);
+        status = back_up_before(cli, job);
+        if (status == DONE)
+            status = run(cli, job, &outcome);
         if (status == DONE) {
             say(cli, "Board FLASH memory writed successfully.\nBoard FLASH memory verified successfully.\n");
             print_outcome(cli, "restored", job, &outcome);
