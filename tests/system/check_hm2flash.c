@@ -247,6 +247,36 @@ START_TEST(backs_up_before_the_fallback_image_is_replaced)
 }
 END_TEST
 
+/* H7 */
+START_TEST(shows_what_is_wrong_with_the_boot_block)
+{
+    const char *const flash = flash_rig_path("flash"), *const args[] = {"--card", "7i93", "--flash", flash, NULL};
+    const char *const image = flash_rig_image("7i93_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 3});
+    simulator_stop(&sim);
+    simulator_start(&sim, args);
+    run(DONE, "--addr", sim.address[0], "--write", image, "--dry-run");
+    ck_assert_ptr_null(strstr(tool.text, "boot block 0x"));
+    simulator_stop(&sim);
+    FILE *const file = fopen(flash, "r+b");
+    ck_assert_ptr_nonnull(file);
+    ck_assert_int_eq(fseek(file, 25, SEEK_SET), 0);
+    ck_assert_int_eq(fputc(0x08, file), 0x08); /* of a chip half as large */
+    ck_assert_int_eq(fclose(file), 0);
+    simulator_start(&sim, args);
+    for (unsigned repair = 0; repair < 2; repair++) {
+        run(repair ? DONE : REFUSED, "--addr", sim.address[0], "--write", image,
+            repair ? "--fix-boot-block" : "--verbose", "--backup-to", flash_rig_path("kept.bin"));
+        printed("boot block 0x10, found:    FF FF 32 61 00 00 32 81 0B 08 32 A1 00 00 32 C1\n");
+        printed("boot block 0x10, expected: FF FF 32 61 00 00 32 81 0B 10 32 A1 00 00 32 C1\n");
+        ck_assert_ptr_null(strstr(tool.text, "boot block 0x00"));
+    }
+    printed("BootBlock installed\n");
+    run(DONE, "--addr", sim.address[0], "--write", image);
+    printed("Boot sector OK\n");
+    ck_assert_ptr_null(strstr(tool.text, "boot block 0x"));
+}
+END_TEST
+
 START_TEST(works_on_many_cards_and_finds_them)
 {
     char both[40], line[96];
@@ -289,6 +319,7 @@ int main(void)
     tcase_add_test(tests, sets_and_reads_settings_and_registers);
     tcase_add_test(tests, asks_before_outputs_let_go);
     tcase_add_test(tests, backs_up_before_the_fallback_image_is_replaced);
+    tcase_add_test(tests, shows_what_is_wrong_with_the_boot_block);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
     suite_add_tcase(suite, tests);

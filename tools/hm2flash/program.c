@@ -146,6 +146,32 @@ static void json_plan(const struct cli *const cli, const struct flash_job *const
     json_end(cli);
 }
 
+/* The boot block byte by byte where it is not what belongs there, also when that is refused afterwards (H7). */
+static int show_boot_difference(struct cli *const cli)
+{
+    enum { ROW = 16 };
+    const struct flash_card_info *const info = cli->info;
+    uint8_t found[FLASH_BOOT_BLOCK_BYTES], right[FLASH_BOOT_BLOCK_BYTES];
+    if (!info->board || info->board->family != FLASH_XILINX || !info->chip)
+        return DONE;
+    const int err = flash_card_read(cli->card, 0, found, sizeof found, &cli->diag);
+    if (err < 0)
+        return report(cli, err);
+    flash_boot_block(info->chip, right);
+    for (unsigned at = 0; at < sizeof found; at += ROW) {
+        char texts[2][3 * ROW + 1];
+        if (memcmp(found + at, right + at, ROW) == 0)
+            continue;
+        for (unsigned i = 0; i < ROW; i++) {
+            snprintf(texts[0] + (size_t)3 * i, 4, " %02X", found[at + i]);
+            snprintf(texts[1] + (size_t)3 * i, 4, " %02X", right[at + i]);
+        }
+        (void)complain(cli, 0, "boot block 0x%02X, found:   %s", at, texts[0]);
+        (void)complain(cli, 0, "boot block 0x%02X, expected:%s", at, texts[1]);
+    }
+    return DONE;
+}
+
 /* Whether anything of what rescues the card, fallback image or boot block, is about to change. */
 static bool changes_rescue(const struct cli *const cli, const struct flash_plan *const plan)
 {
@@ -224,6 +250,9 @@ static int write_image(struct cli *const cli, const char *const path, const uint
         return status;
     const struct flash_options options = options_of(cli, path);
     announce(cli, bytes, len, options.area);
+    status = show_boot_difference(cli);
+    if (status != DONE)
+        return status;
     const int err = flash_job_write(&job, cli->card, &image, &options, &cli->diag);
     if (err < 0)
         return report(cli, err);
