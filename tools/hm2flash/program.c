@@ -48,6 +48,17 @@ static int parse_image(struct cli *const cli, const uint8_t *const bytes, const 
     return DONE;
 }
 
+/* H15: a program sees one chip, and not which one. */
+static void remind_second_chip(const struct cli *const cli)
+{
+    const char *const jumper = cli->info->board ? cli->info->board->second_chip : NULL;
+    if (jumper)
+        (void)complain(cli, 0,
+                       "the %s has two flash chips, and this concerns only the one that jumper %s chooses now (up: the "
+                       "first, down: the second)",
+                       card_name(cli), jumper);
+}
+
 /* Which card, which part of it, which file: to be seen before anything happens (H18, H20). */
 static void announce(const struct cli *const cli, const uint8_t *const bytes, const size_t len,
                      const enum flash_area area)
@@ -57,9 +68,7 @@ static void announce(const struct cli *const cli, const uint8_t *const bytes, co
     sha256_text(bytes, len, hash);
     say(cli, "Board: %s at %s, MAC address %02X:%02X:%02X:%02X:%02X:%02X, %s area\nsha256: '%s'\n", card_name(cli),
         cli->address, m[0], m[1], m[2], m[3], m[4], m[5], area == FLASH_USER ? "user" : "fallback", hash);
-    if (strncmp(card_name(cli), "7I76E", 5) == 0)
-        say(cli, "This card has two flash chips; the one that jumper %s chooses now is written.\n",
-            strcmp(card_name(cli), "7I76EU") == 0 ? "W7" : "W9");
+    remind_second_chip(cli);
 }
 
 /* ---- running a job
@@ -317,6 +326,7 @@ int do_verify(struct cli *const cli, const char *const arg)
         return REFUSED;
     const bool dump = cli->info->chip && len == cli->info->chip->bytes;
     int status = dump ? DONE : parse_image(cli, bytes, len, &image);
+    remind_second_chip(cli);
     const struct flash_options options = options_of(cli, arg);
     if (status == DONE && dump)
         err = flash_job_verify_dump(&job, cli->card, bytes, len, &cli->diag);
@@ -402,6 +412,7 @@ int backup_to(struct cli *const cli, const char *const where)
 
 int do_backup(struct cli *const cli, const char *const arg)
 {
+    remind_second_chip(cli);
     const int status = backup_to(cli, arg);
     if (status == DONE)
         json_result(cli, "backup");
@@ -468,6 +479,7 @@ int do_restore(struct cli *const cli, const char *const arg)
         return REFUSED;
     say(cli, "\nRestoring backup %s FLASH memory on the %s board:\n", cli->info->chip ? cli->info->chip->name : "?",
         card_name(cli));
+    remind_second_chip(cli);
     const int status = restore_dump(cli, arg, dump, len);
     free(dump);
     return status;
