@@ -277,6 +277,33 @@ START_TEST(shows_what_is_wrong_with_the_boot_block)
 }
 END_TEST
 
+/* H14 */
+START_TEST(tells_the_way_back_from_a_stored_address)
+{
+    static const char *const bad[] = {"ip=0.1.2.3", "ip=10.0.0.0", "ip=10.0.0.255", "ip=255.255.255.255",
+                                      "ip=224.0.0.1"};
+    static const struct {
+        const char *jumpers, *words;
+        bool counts;
+    } rows[] = {{"0", "as they are now: fixed 192.168.1.121 (0)", false},
+                {"1", "as they are now: fixed from EEPROM (1)", true},
+                {"2", "as they are now: from BOOTP (2)", false},
+                {"3", "as they are now: Force Fallback (3)", false}};
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        simulator_stop(&sim);
+        simulator_start(&sim, (const char *const[]){"--card", "7i96s", "--jumpers", rows[i].jumpers, NULL});
+        run(DONE, "--addr", sim.address[0], "--set", "ip=10.9.8.7");
+        printed(rows[i].words);
+        printed("both address jumpers down, power on, and it is at 192.168.1.121");
+        ck_assert(rows[i].counts == !strstr(tool.text, "warning: the card does not take its address"));
+    }
+    for (unsigned i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        run(REFUSED, "--addr", sim.address[0], "--set", bad[i]);
+    run(DONE, "--addr", sim.address[0], "--json"); /* none of them was stored */
+    printed("\"eeprom_ip\": \"10.9.8.7\"");
+}
+END_TEST
+
 START_TEST(works_on_many_cards_and_finds_them)
 {
     char both[40], line[96];
@@ -320,6 +347,7 @@ int main(void)
     tcase_add_test(tests, asks_before_outputs_let_go);
     tcase_add_test(tests, backs_up_before_the_fallback_image_is_replaced);
     tcase_add_test(tests, shows_what_is_wrong_with_the_boot_block);
+    tcase_add_test(tests, tells_the_way_back_from_a_stored_address);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
     suite_add_tcase(suite, tests);
