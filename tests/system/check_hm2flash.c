@@ -304,6 +304,39 @@ START_TEST(tells_the_way_back_from_a_stored_address)
 }
 END_TEST
 
+START_TEST(prints_daughter_boards_in_capitals)
+{
+    run(DONE, "--addr", sim.address[1], "--readhmid", "--dbname1", "7i77");
+    printed("7I77");
+    ck_assert_ptr_null(strstr(tool.text, "7i77"));
+}
+END_TEST
+
+/* H18: a check sum beside the file counts without being asked for, and the file's own is printed. */
+START_TEST(refuses_a_file_that_its_check_sum_does_not_fit)
+{
+    static const char wrong[] = "0000000000000000000000000000000000000000000000000000000000000000 *7i96s_test.bin\n";
+    const char *const address = sim.address[0], *const image = image_7i96s(1);
+    run(REFUSED, "--addr", address, "--write", image, "--sha256-check");
+    run(DONE, "--addr", address, "--write", image, "--dry-run");
+    const char *const hash = strstr(tool.text, "sha256: '");
+    ck_assert_ptr_nonnull(hash);
+    ck_assert_uint_eq(strspn(hash + 9, "0123456789abcdef"), 64);
+    char right[100];
+    snprintf(right, sizeof right, "%.64s *7i96s_test.bin\n", hash + 9);
+    const char *const texts[] = {wrong, "no check sum\n", right};
+    for (unsigned i = 0; i < 3; i++) {
+        FILE *const side = fopen(flash_rig_path("7i96s_test.bin.sha256"), "w");
+        ck_assert_ptr_nonnull(side);
+        ck_assert_int_ge(fputs(texts[i], side), 0);
+        ck_assert_int_eq(fclose(side), 0);
+        run(i == 2 ? DONE : REFUSED, "--addr", address, "--write", image);
+        ck_assert(i == 2 || !strstr(tool.text, "Board: ")); /* nothing but the file was looked at */
+    }
+    printed("Bitfile integrity verification passed\n");
+}
+END_TEST
+
 START_TEST(works_on_many_cards_and_finds_them)
 {
     char both[40], line[96];
@@ -348,6 +381,8 @@ int main(void)
     tcase_add_test(tests, backs_up_before_the_fallback_image_is_replaced);
     tcase_add_test(tests, shows_what_is_wrong_with_the_boot_block);
     tcase_add_test(tests, tells_the_way_back_from_a_stored_address);
+    tcase_add_test(tests, prints_daughter_boards_in_capitals);
+    tcase_add_test(tests, refuses_a_file_that_its_check_sum_does_not_fit);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
     suite_add_tcase(suite, tests);

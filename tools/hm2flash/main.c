@@ -391,9 +391,9 @@ static void upper(char *const to, const size_t size, const char *const from)
 
 static int take_dbname(struct cli *const cli, const unsigned connector, const char *const name)
 {
-    const struct terminals *table;
-    if (terminals_find(name)) {
-        cli->dbnames[connector] = name;
+    const struct terminals *table = terminals_find(name);
+    if (table) {
+        cli->dbnames[connector] = table->name; /* in capitals, however it was given */
         return DONE;
     }
     printf("--dbname%u %s not recognized\nValid daughterboard names are:\n", connector + 1, name);
