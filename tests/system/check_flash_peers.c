@@ -183,7 +183,8 @@ START_TEST(what_one_writes_verifies_with_the_other)
         MUST(run_mesa(card, (const char *const[]){"--write", second, NULL}), mesa);
         MUST(run_ours(card, (const char *const[]){"--verify", second, NULL}), ours);
         const char *const fallback = image_of(card, 3, SIM_AREA_FALLBACK);
-        MUST(run_ours(card, (const char *const[]){"--fallback", "--write", fallback, "--confirm", "fallback", NULL}),
+        MUST(run_ours(card, (const char *const[]){"--fallback", "--write", fallback, "--confirm", "fallback",
+                                                  "--backup-to", flash_rig_path("."), NULL}),
              ours);
         MUST(run_mesa(card, (const char *const[]){"--fallback", "--verify", fallback, NULL}), mesa);
         MUST(run_mesa(card, (const char *const[]){"--verify", second, NULL}), mesa);

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* hm2flash as a program, on simulated cards over UDP: what it prints, does, refuses, and its exit status. */
 #include <check.h>
+#include <pty.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "flash_rig.h"
@@ -166,6 +168,175 @@ START_TEST(sets_and_reads_settings_and_registers)
 }
 END_TEST
 
+/* --reload of card 0 at a terminal, where this is typed; its exit status. The time limit of the test bounds it. */
+static int reload_at_terminal(const char *const typed)
+{
+    int terminal, status;
+    char text[512];
+    const pid_t pid = forkpty(&terminal, NULL, NULL, NULL);
+    ck_assert_int_ge(pid, 0);
+    if (pid == 0) {
+        execl(process_built("hm2flash"), "hm2flash", "--addr", sim.address[0], "--reload", (char *)NULL);
+        _exit(127);
+    }
+    ck_assert_int_eq(write(terminal, typed, strlen(typed)), (ssize_t)strlen(typed));
+    while (read(terminal, text, sizeof text) > 0)
+        ;
+    close(terminal);
+    ck_assert_int_eq(waitpid(pid, &status, 0), pid);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/* H19 */
+START_TEST(asks_before_outputs_let_go)
+{
+    const char *const address = sim.address[0], *const image = image_7i96s(1);
+    run(DONE, "--addr", address, "--wpo", "0x1100=0x21");
+    run(REFUSED, "--addr", address, "--reload");
+    printed("2 pins of the card are outputs");
+    printed("then add --yes");
+    run(REFUSED, "--addr", address, "--write", image, "--reload");
+    ck_assert_ptr_null(strstr(tool.text, "Erasing"));
+    ck_assert_int_eq(reload_at_terminal("n\n"), REFUSED);
+    ck_assert_int_eq(reload_at_terminal("\n"), REFUSED);
+    ck_assert_uint_eq(simulator_read(&sim, 0, 0x1100), 0x21);
+    run(DONE, "--addr", address, "--write", image); /* leaves the outputs as they are */
+    ck_assert_uint_eq(simulator_read(&sim, 0, 0x1100), 0x21);
+    ck_assert_int_eq(reload_at_terminal("y\n"), DONE);
+    ck_assert_uint_eq(simulator_read(&sim, 0, 0x1100), 0);
+    run(DONE, "--addr", address, "--reload"); /* nothing is an output any more */
+    run(REFUSED, "--addr", address, "--enable-all-mod");
+    run(DONE, "--addr", address, "--enable-all-mod", "--yes");
+    run(DONE, "--addr", address, "--reload", "--yes");
+}
+END_TEST
+
+/* H4: in the current folder under a name of its own, or where --backup-to says; without it nothing is written. */
+START_TEST(backs_up_before_the_fallback_image_is_replaced)
+{
+    const char *const address = sim.address[1], *const kept = flash_rig_path("kept.bin");
+    const char *const image = flash_rig_image("7i93_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 3});
+    const char *const fallback =
+        flash_rig_image("7i93_fallback.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 4});
+    const char *const other =
+        flash_rig_image("7i93_fallback_2.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 5});
+#define WRITE(file) "--addr", address, "--fallback", "--write", file, "--confirm", "fallback"
+    run(DONE, "--addr", address, "--write", image);
+    ck_assert_ptr_null(strstr(tool.text, "backup"));
+    ck_assert_int_eq(chdir("/proc"), 0); /* where nobody makes a file */
+    run(REFUSED, WRITE(fallback));
+    printed("without a backup the flash is not written, and nothing was changed");
+    ck_assert_ptr_null(strstr(tool.text, "Erasing"));
+    run(DONE, WRITE(fallback), "--dry-run");
+    run(DONE, WRITE(fallback), "--backup-to", kept);
+    printed("FLASH memory backup file '");
+    run(FAILED, "--addr", address, "--verify", kept); /* it holds what was there before */
+    run(REFUSED, WRITE(other), "--backup-to", kept);  /* and is not overwritten */
+    ck_assert_int_eq(chdir(flash_rig_path(".")), 0);
+    run(DONE, WRITE(other));
+    printed("Used auto naming backup file: '7I93_flash_backup_");
+    run(DONE, WRITE(other)); /* the same again changes nothing */
+    ck_assert_ptr_null(strstr(tool.text, "backup"));
+    run(REFUSED, "--addr", address, "--restore-flash", kept);
+    printed("--confirm fallback");
+    run(DONE, "--addr", address, "--restore-flash", kept, "--confirm", "fallback", "--backup-to",
+        flash_rig_path("second.bin"));
+    run(DONE, "--addr", address, "--verify", kept);
+#undef WRITE
+    ck_assert_int_eq(chdir("/"), 0);
+}
+END_TEST
+
+/* H7 */
+START_TEST(shows_what_is_wrong_with_the_boot_block)
+{
+    const char *const flash = flash_rig_path("flash"), *const args[] = {"--card", "7i93", "--flash", flash, NULL};
+    const char *const image = flash_rig_image("7i93_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 3});
+    simulator_stop(&sim);
+    simulator_start(&sim, args);
+    run(DONE, "--addr", sim.address[0], "--write", image, "--dry-run");
+    ck_assert_ptr_null(strstr(tool.text, "boot block 0x"));
+    simulator_stop(&sim);
+    FILE *const file = fopen(flash, "r+b");
+    ck_assert_ptr_nonnull(file);
+    ck_assert_int_eq(fseek(file, 25, SEEK_SET), 0);
+    ck_assert_int_eq(fputc(0x08, file), 0x08); /* of a chip half as large */
+    ck_assert_int_eq(fclose(file), 0);
+    simulator_start(&sim, args);
+    for (unsigned repair = 0; repair < 2; repair++) {
+        run(repair ? DONE : REFUSED, "--addr", sim.address[0], "--write", image,
+            repair ? "--fix-boot-block" : "--verbose", "--backup-to", flash_rig_path("kept.bin"));
+        printed("boot block 0x10, found:    FF FF 32 61 00 00 32 81 0B 08 32 A1 00 00 32 C1\n");
+        printed("boot block 0x10, expected: FF FF 32 61 00 00 32 81 0B 10 32 A1 00 00 32 C1\n");
+        ck_assert_ptr_null(strstr(tool.text, "boot block 0x00"));
+    }
+    printed("BootBlock installed\n");
+    run(DONE, "--addr", sim.address[0], "--write", image);
+    printed("Boot sector OK\n");
+    ck_assert_ptr_null(strstr(tool.text, "boot block 0x"));
+}
+END_TEST
+
+/* H14 */
+START_TEST(tells_the_way_back_from_a_stored_address)
+{
+    static const char *const bad[] = {"ip=0.1.2.3", "ip=10.0.0.0", "ip=10.0.0.255", "ip=255.255.255.255",
+                                      "ip=224.0.0.1"};
+    static const struct {
+        const char *jumpers, *words;
+        bool counts;
+    } rows[] = {{"0", "as they are now: fixed 192.168.1.121 (0)", false},
+                {"1", "as they are now: fixed from EEPROM (1)", true},
+                {"2", "as they are now: from BOOTP (2)", false},
+                {"3", "as they are now: Force Fallback (3)", false}};
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        simulator_stop(&sim);
+        simulator_start(&sim, (const char *const[]){"--card", "7i96s", "--jumpers", rows[i].jumpers, NULL});
+        run(DONE, "--addr", sim.address[0], "--set", "ip=10.9.8.7");
+        printed(rows[i].words);
+        printed("both address jumpers down, power on, and it is at 192.168.1.121");
+        ck_assert(rows[i].counts == !strstr(tool.text, "warning: the card does not take its address"));
+    }
+    for (unsigned i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        run(REFUSED, "--addr", sim.address[0], "--set", bad[i]);
+    run(DONE, "--addr", sim.address[0], "--json"); /* none of them was stored */
+    printed("\"eeprom_ip\": \"10.9.8.7\"");
+}
+END_TEST
+
+START_TEST(prints_daughter_boards_in_capitals)
+{
+    run(DONE, "--addr", sim.address[1], "--readhmid", "--dbname1", "7i77");
+    printed("7I77");
+    ck_assert_ptr_null(strstr(tool.text, "7i77"));
+}
+END_TEST
+
+/* H18: a check sum beside the file counts without being asked for, and the file's own is printed. */
+START_TEST(refuses_a_file_that_its_check_sum_does_not_fit)
+{
+    static const char wrong[] = "0000000000000000000000000000000000000000000000000000000000000000 *7i96s_test.bin\n";
+    const char *const address = sim.address[0], *const image = image_7i96s(1);
+    run(REFUSED, "--addr", address, "--write", image, "--sha256-check");
+    run(DONE, "--addr", address, "--write", image, "--dry-run");
+    const char *const hash = strstr(tool.text, "sha256: '");
+    ck_assert_ptr_nonnull(hash);
+    ck_assert_uint_eq(strspn(hash + 9, "0123456789abcdef"), 64);
+    char right[100];
+    snprintf(right, sizeof right, "%.64s *7i96s_test.bin\n", hash + 9);
+    const char *const texts[] = {wrong, "no check sum\n", right};
+    for (unsigned i = 0; i < 3; i++) {
+        FILE *const side = fopen(flash_rig_path("7i96s_test.bin.sha256"), "w");
+        ck_assert_ptr_nonnull(side);
+        ck_assert_int_ge(fputs(texts[i], side), 0);
+        ck_assert_int_eq(fclose(side), 0);
+        run(i == 2 ? DONE : REFUSED, "--addr", address, "--write", image);
+        ck_assert(i == 2 || !strstr(tool.text, "Board: ")); /* nothing but the file was looked at */
+    }
+    printed("Bitfile integrity verification passed\n");
+}
+END_TEST
+
 START_TEST(works_on_many_cards_and_finds_them)
 {
     char both[40], line[96];
@@ -206,6 +377,12 @@ int main(void)
     tcase_add_test(tests, refuses_before_it_erases);
     tcase_add_test(tests, backs_up_and_restores);
     tcase_add_test(tests, sets_and_reads_settings_and_registers);
+    tcase_add_test(tests, asks_before_outputs_let_go);
+    tcase_add_test(tests, backs_up_before_the_fallback_image_is_replaced);
+    tcase_add_test(tests, shows_what_is_wrong_with_the_boot_block);
+    tcase_add_test(tests, tells_the_way_back_from_a_stored_address);
+    tcase_add_test(tests, prints_daughter_boards_in_capitals);
+    tcase_add_test(tests, refuses_a_file_that_its_check_sum_does_not_fit);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
     suite_add_tcase(suite, tests);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* What the programmer refuses before it changes anything (flash tool reference 5; H1, H5 and H6 are in
- * test_flash_write.c, H14 and H15 with the program). */
+ * test_flash_write.c, H4, H7, H14, H18 and H19 also with the program). */
 #include "flash_rig.h"
 
 #include <hm2/bytes.h>
@@ -279,6 +279,21 @@ static void a_dump_of_another_card_is_refused(void **state)
     assert_null(rig->job);
 }
 
+/* ---- a chip that nobody sees (H15)
+ * ------------------------------------------------------------------------------------------------------- */
+
+static void cards_with_a_second_chip_name_its_jumper(void **state)
+{
+    (void)state;
+    assert_string_equal(flash_board_of_card("7I76E-16")->second_chip, "W9");
+    assert_string_equal(flash_board_of_card("7I76EU")->second_chip, "W7");
+    unsigned others = 0;
+    const struct flash_board *board;
+    for (size_t i = 0; (board = flash_board_at(i)) != NULL; i++)
+        others += board->second_chip == NULL;
+    assert_int_equal(others, 18);
+}
+
 /* ---- replies (H17)
  * ------------------------------------------------------------------------------------------------------- */
 
@@ -322,6 +337,7 @@ int main(void)
         ON_7I93(a_driver_that_starts_meanwhile_ends_the_job),
         ON_7I93(a_dump_of_another_card_is_refused),
         ON_7I96S(a_dump_of_another_card_is_refused),
+        cmocka_unit_test(cards_with_a_second_chip_name_its_jumper),
         ON_7I93(late_and_foreign_replies_change_nothing),
     };
     return cmocka_run_group_tests_name("flash hazards", tests, NULL, NULL);

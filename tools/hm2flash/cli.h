@@ -41,6 +41,10 @@ int report(struct cli *cli, int err);
 int complain(const struct cli *cli, int status, const char *format, ...) __attribute__((format(printf, 3, 4)));
 /* Name of the card as on the command line. */
 const char *card_name(const struct cli *cli);
+/* Where the card's address comes from, as its jumpers say. */
+const char *jumper_text(const struct flash_card_info *info);
+/* May outputs change? By option or by an answer at the terminal; otherwise says what to do. */
+bool confirmed(struct cli *cli);
 /* Refuse when outputs are driven, unless confirmed (what = "Reloading"); or when somebody else uses the card. */
 int check_machine(struct cli *cli, const char *what);
 

@@ -7,7 +7,7 @@
 
 #include "cli.h"
 
-static const char *jumper_text(const struct flash_card_info *const info)
+const char *jumper_text(const struct flash_card_info *const info)
 {
     const bool efinix = info->board && info->board->family == FLASH_EFINIX;
     const char *const texts[] = {"fixed 192.168.1.121", "fixed from EEPROM", "from BOOTP",

@@ -68,6 +68,7 @@ enum option_code {
     OPT_DRY_RUN,
     OPT_OVERRIDE,
     OPT_CONFIRM,
+    OPT_YES,
     OPT_EXPECT_MAC,
     OPT_PAGES,
     OPT_BACKUP_TO,
@@ -90,6 +91,7 @@ static const struct plain_option {
     {"dry-run", NULL, OPT_DRY_RUN, "check everything, print the plan, change nothing"},
     {"override", "CARD", OPT_OVERRIDE, "write an image that does not say it is for this card"},
     {"confirm", "WHAT", OPT_CONFIRM, "fallback: write it; outputs: reload although outputs are on"},
+    {"yes", NULL, OPT_YES, "do not ask whether outputs may let go: they may"},
     {"expect-mac", "MAC", OPT_EXPECT_MAC, "refuse another card than this"},
     {"backup-to", "FOLDER", OPT_BACKUP_TO, "save the flash there before it is written"},
     {"pages", "N", OPT_PAGES, "most pages in a datagram, 1 to 5"},
@@ -265,6 +267,24 @@ static void close_card(struct cli *const cli)
     link_close(cli->link);
 }
 
+/* At a terminal only, and not for one of several cards, which would all ask at the same time. */
+static bool answered_yes(const struct cli *const cli)
+{
+    char answer[16];
+    if (cli->many || cli->json || !isatty(STDIN_FILENO) || !isatty(STDERR_FILENO))
+        return false;
+    fprintf(stderr, "Is the machine safe, shall this go on? [y/N] ");
+    return fgets(answer, sizeof answer, stdin) && (strcasecmp(answer, "y\n") == 0 || strcasecmp(answer, "yes\n") == 0);
+}
+
+bool confirmed(struct cli *const cli)
+{
+    cli->confirm_outputs = cli->confirm_outputs || answered_yes(cli);
+    if (!cli->confirm_outputs)
+        (void)complain(cli, 0, "nothing was changed. See that the machine is safe, then add --yes");
+    return cli->confirm_outputs;
+}
+
 int check_machine(struct cli *const cli, const char *const what)
 {
     const int err = cli->any_traffic ? 0 : flash_card_quiet(cli->card, &cli->diag);
@@ -273,12 +293,11 @@ int check_machine(struct cli *const cli, const char *const what)
     const int outputs = flash_card_outputs(cli->card, &cli->diag);
     if (outputs < 0)
         return report(cli, outputs);
-    if (outputs > 0 && !cli->confirm_outputs)
-        return complain(cli, REFUSED,
-                        "%u pins of the card are outputs. %s lets go of all of them, and they float high. See that the "
-                        "machine is safe, then add --confirm outputs (or --safe-io before)",
-                        (unsigned)outputs, what);
-    return DONE;
+    if (outputs == 0)
+        return DONE;
+    (void)complain(cli, 0, "%u pins of the card are outputs. %s lets go of all of them, and they float high",
+                   (unsigned)outputs, what);
+    return confirmed(cli) ? DONE : REFUSED;
 }
 
 /* ---- one run --------------------------------------------------------------------------------------------------------
@@ -372,9 +391,9 @@ static void upper(char *const to, const size_t size, const char *const from)
 
 static int take_dbname(struct cli *const cli, const unsigned connector, const char *const name)
 {
-    const struct terminals *table;
-    if (terminals_find(name)) {
-        cli->dbnames[connector] = name;
+    const struct terminals *table = terminals_find(name);
+    if (table) {
+        cli->dbnames[connector] = table->name; /* in capitals, however it was given */
         return DONE;
     }
     printf("--dbname%u %s not recognized\nValid daughterboard names are:\n", connector + 1, name);
@@ -408,15 +427,11 @@ static int take_option(struct cli *const cli, const int code, const char *const 
     const struct {
         int code;
         bool *flag;
-    } flags[] = {{OPT_FALLBACK, &cli->fallback},
-                 {OPT_XML, &cli->xml},
-                 {OPT_VERBOSE, &cli->verbose},
-                 {OPT_FIX, &cli->fix_boot_block},
-                 {OPT_NO_VERIFY, &cli->no_verify},
-                 {OPT_SHA256, &cli->sha256_check},
-                 {OPT_JSON, &cli->json},
-                 {OPT_DRY_RUN, &cli->dry_run},
-                 {OPT_ANY_TRAFFIC, &cli->any_traffic}};
+    } flags[] = {{OPT_FALLBACK, &cli->fallback},   {OPT_XML, &cli->xml},
+                 {OPT_VERBOSE, &cli->verbose},     {OPT_FIX, &cli->fix_boot_block},
+                 {OPT_NO_VERIFY, &cli->no_verify}, {OPT_SHA256, &cli->sha256_check},
+                 {OPT_JSON, &cli->json},           {OPT_DRY_RUN, &cli->dry_run},
+                 {OPT_YES, &cli->confirm_outputs}, {OPT_ANY_TRAFFIC, &cli->any_traffic}};
     const struct {
         int code;
         const char **text;

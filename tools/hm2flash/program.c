@@ -48,6 +48,17 @@ static int parse_image(struct cli *const cli, const uint8_t *const bytes, const 
     return DONE;
 }
 
+/* H15: a program sees one chip, and not which one. */
+static void remind_second_chip(const struct cli *const cli)
+{
+    const char *const jumper = cli->info->board ? cli->info->board->second_chip : NULL;
+    if (jumper)
+        (void)complain(cli, 0,
+                       "the %s has two flash chips, and this concerns only the one that jumper %s chooses now (up: the "
+                       "first, down: the second)",
+                       card_name(cli), jumper);
+}
+
 /* Which card, which part of it, which file: to be seen before anything happens (H18, H20). */
 static void announce(const struct cli *const cli, const uint8_t *const bytes, const size_t len,
                      const enum flash_area area)
@@ -57,9 +68,7 @@ static void announce(const struct cli *const cli, const uint8_t *const bytes, co
     sha256_text(bytes, len, hash);
     say(cli, "Board: %s at %s, MAC address %02X:%02X:%02X:%02X:%02X:%02X, %s area\nsha256: '%s'\n", card_name(cli),
         cli->address, m[0], m[1], m[2], m[3], m[4], m[5], area == FLASH_USER ? "user" : "fallback", hash);
-    if (strncmp(card_name(cli), "7I76E", 5) == 0)
-        say(cli, "This card has two flash chips; the one that jumper %s chooses now is written.\n",
-            strcmp(card_name(cli), "7I76EU") == 0 ? "W7" : "W9");
+    remind_second_chip(cli);
 }
 
 /* ---- running a job
@@ -146,6 +155,57 @@ static void json_plan(const struct cli *const cli, const struct flash_job *const
     json_end(cli);
 }
 
+/* The boot block byte by byte where it is not what belongs there, also when that is refused afterwards (H7). */
+static int show_boot_difference(struct cli *const cli)
+{
+    enum { ROW = 16 };
+    const struct flash_card_info *const info = cli->info;
+    uint8_t found[FLASH_BOOT_BLOCK_BYTES], right[FLASH_BOOT_BLOCK_BYTES];
+    if (!info->board || info->board->family != FLASH_XILINX || !info->chip)
+        return DONE;
+    const int err = flash_card_read(cli->card, 0, found, sizeof found, &cli->diag);
+    if (err < 0)
+        return report(cli, err);
+    flash_boot_block(info->chip, right);
+    for (unsigned at = 0; at < sizeof found; at += ROW) {
+        char texts[2][3 * ROW + 1];
+        if (memcmp(found + at, right + at, ROW) == 0)
+            continue;
+        for (unsigned i = 0; i < ROW; i++) {
+            snprintf(texts[0] + (size_t)3 * i, 4, " %02X", found[at + i]);
+            snprintf(texts[1] + (size_t)3 * i, 4, " %02X", right[at + i]);
+        }
+        (void)complain(cli, 0, "boot block 0x%02X, found:   %s", at, texts[0]);
+        (void)complain(cli, 0, "boot block 0x%02X, expected:%s", at, texts[1]);
+    }
+    return DONE;
+}
+
+/* Whether anything of what rescues the card, fallback image or boot block, is about to change. */
+static bool changes_rescue(const struct cli *const cli, const struct flash_plan *const plan)
+{
+    const unsigned user = cli->info->chip->bytes / 2 / FLASH_SECTOR_BYTES;
+    for (unsigned s = 0; s < user; s++)
+        if (plan->state[s] > FLASH_SECTOR_SAME)
+            return true;
+    return false;
+}
+
+/* What rescues the card is never written without a copy of what was there (H4): in the current folder, unless the
+ * command line names a place. */
+static int back_up_before(struct cli *const cli, const struct flash_job *const job)
+{
+    const struct flash_plan *const plan = flash_job_plan(job);
+    const bool allowed = cli->confirm_fallback || cli->fix_boot_block; /* otherwise the job refuses by itself */
+    if (plan->to_write == 0 || (!cli->backup_to && !(allowed && changes_rescue(cli, plan))))
+        return DONE;
+    const int status = backup_to(cli, cli->backup_to ? cli->backup_to : ".");
+    return status == DONE ? DONE
+                          : complain(cli, status == LOST ? LOST : REFUSED,
+                                     "without a backup the flash is not written, and nothing was changed: give a place "
+                                     "for it with --backup-to");
+}
+
 /* ---- write
  * ------------------------------------------------------------------------------------------------------------ */
 
@@ -169,7 +229,9 @@ static int write_job(struct cli *const cli, struct flash_job *const job)
         return DONE;
     }
     const bool nothing = flash_job_plan(job)->to_write == 0;
-    status = run(cli, job, &outcome);
+    status = back_up_before(cli, job);
+    if (status == DONE)
+        status = run(cli, job, &outcome);
     if (status != DONE)
         return status;
     if (flash_job_plan(job)->boot_block)
@@ -197,8 +259,7 @@ static int write_image(struct cli *const cli, const char *const path, const uint
         return status;
     const struct flash_options options = options_of(cli, path);
     announce(cli, bytes, len, options.area);
-    if (cli->backup_to && !cli->dry_run)
-        status = backup_to(cli, cli->backup_to);
+    status = show_boot_difference(cli);
     if (status != DONE)
         return status;
     const int err = flash_job_write(&job, cli->card, &image, &options, &cli->diag);
@@ -265,6 +326,7 @@ int do_verify(struct cli *const cli, const char *const arg)
         return REFUSED;
     const bool dump = cli->info->chip && len == cli->info->chip->bytes;
     int status = dump ? DONE : parse_image(cli, bytes, len, &image);
+    remind_second_chip(cli);
     const struct flash_options options = options_of(cli, arg);
     if (status == DONE && dump)
         err = flash_job_verify_dump(&job, cli->card, bytes, len, &cli->diag);
@@ -292,8 +354,11 @@ static void name_backup(const struct cli *const cli, const char *const where, ch
     }
     (void)localtime_r(&now, &local);
     (void)strftime(stamp, sizeof stamp, "%d%m%y_%H%M%S", &local);
-    char name[128];
-    snprintf(name, sizeof name, "%s_flash_backup_%s.bin", card_name(cli), stamp);
+    char name[128], which[16] = "";
+    const uint8_t *const m = cli->info->mac;
+    if (cli->many) /* several of a kind must not meet in one file */
+        snprintf(which, sizeof which, "_%02X%02X%02X%02X%02X%02X", m[0], m[1], m[2], m[3], m[4], m[5]);
+    snprintf(name, sizeof name, "%s_flash_backup_%s%s.bin", card_name(cli), stamp, which);
     snprintf(path, size, "%s%s%s", where, where[strlen(where) - 1] == '/' ? "" : "/", name);
     say(cli, "Used auto naming backup file: '%s'\n", name);
 }
@@ -347,6 +412,7 @@ int backup_to(struct cli *const cli, const char *const where)
 
 int do_backup(struct cli *const cli, const char *const arg)
 {
+    remind_second_chip(cli);
     const int status = backup_to(cli, arg);
     if (status == DONE)
         json_result(cli, "backup");
@@ -393,7 +459,9 @@ static int restore_dump(struct cli *const cli, const char *const path, const uin
     if (status == DONE && cli->dry_run)
         json_plan(cli, job);
     if (status == DONE && !cli->dry_run) {
-        status = run(cli, job, &outcome);
+        status = back_up_before(cli, job);
+        if (status == DONE)
+            status = run(cli, job, &outcome);
         if (status == DONE) {
             say(cli, "Board FLASH memory writed successfully.\nBoard FLASH memory verified successfully.\n");
             print_outcome(cli, "restored", job, &outcome);
@@ -411,6 +479,7 @@ int do_restore(struct cli *const cli, const char *const arg)
         return REFUSED;
     say(cli, "\nRestoring backup %s FLASH memory on the %s board:\n", cli->info->chip ? cli->info->chip->name : "?",
         card_name(cli));
+    remind_second_chip(cli);
     const int status = restore_dump(cli, arg, dump, len);
     free(dump);
     return status;

@@ -101,11 +101,8 @@ int do_enable_all(struct cli *const cli, const char *const arg)
     const int status = check_alone(cli);
     if (status != DONE)
         return status;
-    if (!cli->confirm_outputs)
-        return complain(cli, REFUSED,
-                        "this switches on every output that a module has, whatever is connected to it. If "
-                        "that is safe, add --confirm outputs");
-    return set_ports(cli, true);
+    (void)complain(cli, 0, "this switches on every output that a module has, whatever is connected to it");
+    return confirmed(cli) ? set_ports(cli, true) : REFUSED;
 }
 
 int do_safe_io(struct cli *const cli, const char *const arg)
@@ -134,14 +131,18 @@ static int store_address(struct cli *const cli, const uint16_t at, const uint8_t
     return report(cli, flash_card_write_eeprom(cli->card, at, 2, words, &cli->diag));
 }
 
-static void warn_jumpers(const struct cli *const cli)
+/* H14: whether the stored address will count, and the way back from one that nobody reaches. */
+static void tell_jumpers(const struct cli *const cli)
 {
     if (cli->info->jumpers != JUMPERS_EEPROM)
-        (void)complain(
-            cli, 0,
-            "warning: the card does not take its address from the EEPROM: its jumpers say %u, and down/up (1) "
-            "would. With both jumpers down it is always at 192.168.1.121",
-            cli->info->jumpers);
+        (void)complain(cli, 0,
+                       "warning: the card does not take its address from the EEPROM; its jumpers must be down/up for "
+                       "that");
+    (void)complain(cli, 0, "address by the jumpers as they are now: %s (%u)", jumper_text(cli->info),
+                   cli->info->jumpers);
+    (void)complain(cli, 0,
+                   "--reset or power-on makes it count. Should nobody reach the card then: both address jumpers down, "
+                   "power on, and it is at 192.168.1.121");
 }
 
 static int set_ip(struct cli *const cli, const char *const value)
@@ -156,7 +157,7 @@ static int set_ip(struct cli *const cli, const char *const value)
     const int status = store_address(cli, LBP16_EEPROM_IP, ip);
     if (status == DONE) {
         say(cli, "Board IP updated successfully.\n");
-        warn_jumpers(cli);
+        tell_jumpers(cli);
     }
     return status;
 }

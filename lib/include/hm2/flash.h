@@ -45,7 +45,8 @@ struct flash_board {
     const char *connectors[4]; /* one a port */
     const char *terminals[4];  /* names of the built-in terminal tables, or NULL */
     unsigned leds;
-    bool any_case; /* the card's name is compared without regard to case */
+    bool any_case;           /* the card's name is compared without regard to case */
+    const char *second_chip; /* jumper that chooses one of two flash chips (2.3), only that one is seen; NULL = one */
 };
 
 /* Rows of the table (flash tool reference 2.1); NULL behind the last. */
