@@ -163,7 +163,7 @@ static void set_local(struct remote_lbp *const line, const uint8_t code, const u
         line->pointer = (uint16_t)((line->pointer & 0xFF00u) | value);
         break;
     case LBP_SET_HIGH_ADDRESS:
-        line->pointer = (uint16_t)((line->pointer & 0x00FFu) | value << 8);
+        line->pointer = (uint16_t)((line->pointer & 0x00FFu) | (unsigned)value << 8);
         break;
     case LBP_ADD_ADDRESS:
         line->pointer = (uint16_t)(line->pointer + value);
