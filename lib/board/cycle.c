@@ -107,6 +107,19 @@ bool hm2_board_request_outstanding(const struct hm2_board *const board)
 /* ---- reply --------------------------------------------------------------------------------------------------------
  */
 
+HM2_RARE static void take_late(struct hm2_board *const board)
+{
+    const uint64_t request = hm2_plan_late_request(board->plan);
+    count(board->points->late);
+    if (request == 0)
+        return;
+    hm2_plan_swap_late(board->plan);
+    for (unsigned i = 0; i < board->module_count; i++)
+        if (board->modules[i].type->late)
+            board->modules[i].type->late(&board->modules[i], request);
+    hm2_plan_swap_late(board->plan);
+}
+
 /* One datagram in a normal cycle: true when it is the reply that is waited for. */
 static bool judge(struct hm2_board *const board, const size_t len)
 {
@@ -117,7 +130,7 @@ static bool judge(struct hm2_board *const board, const size_t len)
         count(board->points->stale);
         return false;
     case HM2_REPLY_LATE:
-        count(board->points->late);
+        take_late(board);
         return false;
     case HM2_REPLY_MALFORMED:
         break;

@@ -195,10 +195,31 @@ enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
     if ((plan->answered & bit) != 0)
         return HM2_REPLY_STALE;
     plan->answered |= bit;
-    if (age > 0 || !plan->outstanding)
+    if (age > 0 || !plan->outstanding) {
+        const uint64_t number = plan->requests - age;
+        plan->late_request = age < 64 && number > plan->requests_before ? number : 0;
         return HM2_REPLY_LATE;
+    }
     accept(plan);
     return HM2_REPLY_FRESH;
+}
+
+uint64_t hm2_plan_requests(const struct hm2_plan *const plan)
+{
+    return plan->requests;
+}
+
+uint64_t hm2_plan_late_request(const struct hm2_plan *const plan)
+{
+    return plan->late_request;
+}
+
+void hm2_plan_swap_late(struct hm2_plan *const plan)
+{
+    uint8_t fresh[sizeof plan->reply];
+    memcpy(fresh, plan->reply, plan->reply_len);
+    memcpy(plan->reply, plan->landing, plan->reply_len);
+    memcpy(plan->landing, fresh, plan->reply_len);
 }
 
 struct hm2_plan_facts hm2_plan_facts(const struct hm2_plan *const plan)

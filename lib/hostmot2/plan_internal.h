@@ -76,8 +76,10 @@ struct hm2_plan {
     size_t setup_len;
 
     uint32_t request_seq;
-    uint64_t requests; /* sent so far */
-    uint64_t answered; /* bit n: the n-th request before the last one got its answer */
+    uint64_t requests;        /* sent so far */
+    uint64_t requests_before; /* those that an earlier layout made */
+    uint64_t late_request;    /* what the last late reply answers; 0: nothing that can be read */
+    uint64_t answered;        /* bit n: the n-th request before the last one got its answer */
     bool outstanding;
     uint32_t write_at_request; /* write_seq when the last request was made */
     size_t request_len, reply_len;

@@ -353,6 +353,7 @@ void hm2_plan_reopen(struct hm2_plan *const plan)
     if (!plan->frozen)
         return;
     plan->frozen = plan->outstanding = false;
+    plan->requests_before = plan->requests; /* replies to these have another layout */
     note_places(&plan->reads, plan->reply);
     note_places(&plan->writes, plan->write);
 }

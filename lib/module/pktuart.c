@@ -57,6 +57,9 @@ struct pktuart {
     uint32_t tx_mode_seen, rx_mode_seen;
 
     unsigned popped_words, popped_counts; /* asked for */
+    uint64_t request;                     /* in this one */
+    bool unanswered;                      /* which was given up: nothing more is asked for until its reply is late or
+                                           * a later one shows that it is lost */
     unsigned sizes;                       /* frames whose size is known, oldest first */
     uint16_t size[FRAMES];
     bool clearing;
@@ -166,6 +169,7 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
     hm2_section_touch(&p->rx_mode);
     p->queued = p->queued_words = p->sizes = 0;
     p->popped_words = p->popped_counts = 0;
+    p->unanswered = false;
     return 0;
 }
 
@@ -235,6 +239,7 @@ struct hm2_serial *pktuart_port(const struct hm2_module *const module, const uns
 static void start_over(struct pktuart *const p)
 {
     p->sizes = p->popped_words = p->popped_counts = 0;
+    p->unanswered = false;
     p->clearing = true;
     hm2_section_touch(&p->rx_clear);
 }
@@ -266,8 +271,19 @@ static void take_sizes(struct pktuart *const p)
     p->popped_counts = 0;
 }
 
+/* A later reply has come before the one with what was asked for: that is lost, and with it the frames it belongs to. */
+static void lose_frames(struct pktuart *const p)
+{
+    for (unsigned i = 0; i < p->sizes; i++)
+        p->port.counts.rx_uncertain += p->size[i];
+    p->port.counts.rx_errors += p->sizes + p->popped_counts;
+    start_over(p);
+}
+
 static void take_received(struct pktuart *const p)
 {
+    if (p->unanswered)
+        lose_frames(p);
     p->rx_mode_seen = hm2_window_get(&p->rx_state, 0);
     if (p->clearing) {
         p->clearing = !hm2_section_confirmed(&p->rx_clear);
@@ -312,6 +328,20 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     }
 }
 
+static void late(struct hm2_module *const module, const uint64_t request)
+{
+    const struct pktuarts *const ctx = module->context;
+    for (unsigned unit = 0; ctx && unit < module->instances; unit++) {
+        struct pktuart *const p = &ctx->port[unit];
+        if (!p->port.open || p->clearing || p->request != request)
+            continue;
+        p->rx_mode_seen = hm2_window_get(&p->rx_state, 0);
+        take_words(p);
+        take_sizes(p);
+        p->unanswered = false;
+    }
+}
+
 static void write_lost(struct hm2_module *const module)
 {
     const struct pktuarts *const ctx = module->context;
@@ -322,14 +352,10 @@ static void write_lost(struct hm2_module *const module)
 /* ---- write ----------------------------------------------------------------------------------------------------------
  */
 
-/* No fresh reply since the last write: what was asked for is gone if the card gave it, and nobody knows what it sent.
- */
+/* No fresh reply since the last write: what was asked for may still come, and nobody knows what the card sent. */
 static void miss(struct pktuart *const p)
 {
-    if (p->popped_words > 0 || p->popped_counts > 0) {
-        p->port.counts.rx_uncertain += 4u * p->popped_words;
-        start_over(p);
-    }
+    p->unanswered = p->popped_words > 0 || p->popped_counts > 0;
     p->port.counts.tx_uncertain += p->sent_words > 0 ? p->sent_bytes : 0;
     p->sent_words = 0;
     p->resend = false;
@@ -370,10 +396,17 @@ static unsigned known_words(const struct pktuart *const p)
 
 static void ask_received(struct pktuart *const p)
 {
+    if (p->unanswered) {
+        queue_aim(&p->in, 0);
+        for (unsigned i = 0; i < COUNTS; i++)
+            hm2_put_le16(p->in_count[i].address, p->rx[REG_RATE]);
+        return;
+    }
     const bool ready = !p->clearing && hm2_section_confirmed(&p->rx_mode) && hm2_section_confirmed(&p->rx_rate);
     const unsigned room = (RING_BYTES - ring_used(&p->port.rx)) / 4u, known = known_words(p);
     const unsigned words = known < WORDS ? known : WORDS;
     p->popped_words = !ready ? 0 : words < room ? words : room;
+    p->request = hm2_plan_requests(p->port.plan) + 1u;
     queue_aim(&p->in, p->popped_words);
     const unsigned there = ready ? MODE_FRAMES(p->rx_mode_seen) : 0;
     const unsigned places = FRAMES - p->sizes;
@@ -410,6 +443,7 @@ const struct hm2_module_type hm2_pktuart_type = {
     .unpack = unpack,
     .pack = pack,
     .write_lost = write_lost,
+    .late = late,
     .groups = groups,
 };
 

@@ -5,6 +5,8 @@
  * fewer, and the number of bytes before and after tells which of the two it did, also when a byte came in between. So
  * a byte waits for at most one cycle, and sixteen are enough for 115200 baud at 1 kHz.
  */
+#include <string.h>
+
 #include "module_types.h"
 #include "serial.h"
 
@@ -25,6 +27,15 @@ enum { REG_DATA, REG_COUNT, REG_RATE, REG_MODE };
 #define RX_ERRORS   3u
 #define RX_LOST     (1u << 5)
 
+/* What a request takes out of the receiver. */
+struct asked {
+    uint64_t request;
+    unsigned popped; /* by `first` */
+    bool fours;
+};
+
+#define UNANSWERED 4u
+
 struct uart {
     struct hm2_serial port; /* first: a port is found through it */
     uint16_t tx[4], rx[4];
@@ -32,8 +43,10 @@ struct uart {
     struct queue out;
     struct hm2_window tail, first, in[POPS], rx_count[POPS + 1], rx_state, tx_count;
     bool awaiting, resend, again;
-    unsigned sent_bytes, known, popped, free_words; /* popped: by `first` */
-    bool in_aimed;
+    unsigned sent_bytes, known, free_words;
+    struct asked asked;                  /* in the last request */
+    struct asked unanswered[UNANSWERED]; /* in those that were given up, oldest first; their replies may be late */
+    unsigned unanswered_count;
 };
 
 struct uarts {
@@ -97,7 +110,8 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
     hm2_section_set(&u->rx_mode, 0, s->mask ? RX_MASK : 0);
     hm2_section_touch(&u->tx_clear);
     hm2_section_touch(&u->rx_clear);
-    u->known = u->popped = u->free_words = 0;
+    u->known = u->free_words = u->unanswered_count = 0;
+    u->asked = (struct asked){0};
     return 0;
 }
 
@@ -153,14 +167,28 @@ static unsigned count_at(const struct uart *const u, const unsigned i)
     return hm2_window_get(&u->rx_count[i], 0) & COUNT_MASK;
 }
 
-static void take_received(struct uart *const u)
+static void take_bytes(struct uart *const u, const struct asked asked)
 {
-    take(u, &u->first, u->popped);
-    for (unsigned i = 0; u->in_aimed && i < POPS; i++)
+    take(u, &u->first, asked.popped);
+    for (unsigned i = 0; asked.fours && i < POPS; i++)
         if (count_at(u, i + 1) < count_at(u, i))
             take(u, &u->in[i], POP_BYTES);
-    u->popped = 0;
-    u->in_aimed = false;
+}
+
+/* The oldest of the unanswered will not be answered any more. */
+static void drop_unanswered(struct uart *const u, const unsigned n)
+{
+    for (unsigned i = 0; i < n; i++)
+        u->port.counts.rx_uncertain += u->unanswered[i].popped + (u->unanswered[i].fours ? POPS * POP_BYTES : 0);
+    u->unanswered_count -= n;
+    memmove(u->unanswered, u->unanswered + n, u->unanswered_count * sizeof u->unanswered[0]);
+}
+
+static void take_received(struct uart *const u)
+{
+    drop_unanswered(u, u->unanswered_count); /* a later reply is here already */
+    take_bytes(u, u->asked);
+    u->asked = (struct asked){0};
     const uint32_t state = hm2_window_get(&u->rx_state, 0);
     u->known = count_at(u, POPS);
     u->again = u->again && !hm2_section_confirmed(&u->rx_again);
@@ -193,6 +221,33 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     }
 }
 
+static void take_late(struct uart *const u, const uint64_t request)
+{
+    unsigned i = 0;
+    if (u->asked.request == request) { /* given up, but no write was made since */
+        drop_unanswered(u, u->unanswered_count);
+        take_bytes(u, u->asked);
+        u->asked = (struct asked){0};
+        return;
+    }
+    while (i < u->unanswered_count && u->unanswered[i].request != request)
+        i++;
+    if (i == u->unanswered_count)
+        return;
+    drop_unanswered(u, i);
+    take_bytes(u, u->unanswered[0]);
+    u->unanswered[0] = (struct asked){0};
+    drop_unanswered(u, 1);
+}
+
+static void late(struct hm2_module *const module, const uint64_t request)
+{
+    const struct uarts *const ctx = module->context;
+    for (unsigned unit = 0; ctx && unit < module->instances; unit++)
+        if (ctx->port[unit].port.open)
+            take_late(&ctx->port[unit], request);
+}
+
 static void write_lost(struct hm2_module *const module)
 {
     const struct uarts *const ctx = module->context;
@@ -205,10 +260,14 @@ static void write_lost(struct hm2_module *const module)
 
 static void miss(struct uart *const u)
 {
-    u->port.counts.rx_uncertain += u->popped + (u->in_aimed ? POPS * POP_BYTES : 0);
-    u->in_aimed = false;
+    if (u->asked.fours) {
+        if (u->unanswered_count == UNANSWERED)
+            drop_unanswered(u, 1);
+        u->unanswered[u->unanswered_count++] = u->asked;
+    }
+    u->asked = (struct asked){0};
     u->port.counts.tx_uncertain += u->sent_bytes;
-    u->popped = u->known = u->sent_bytes = u->free_words = 0;
+    u->known = u->sent_bytes = u->free_words = 0;
     u->resend = false;
 }
 
@@ -233,15 +292,16 @@ static void send_bytes(struct uart *const u)
 static void ask_received(struct uart *const u)
 {
     const bool ready = !u->again && hm2_section_confirmed(&u->rx_rate) && hm2_section_confirmed(&u->rx_clear);
-    const bool room = RING_BYTES - ring_used(&u->port.rx) >= POPS * POP_BYTES + POP_BYTES;
+    const unsigned most = (POPS + 1u) * POP_BYTES * (u->unanswered_count + 1u);
+    const bool room = RING_BYTES - ring_used(&u->port.rx) >= most;
     const unsigned odd = u->known < POP_BYTES ? u->known : POP_BYTES - 1u;
-    u->in_aimed = ready && room;
-    u->popped = u->in_aimed ? odd : 0;
-    const unsigned address = u->popped ? u->rx[REG_DATA] + SIZE_STRIDE * (u->popped - 1u) : u->rx[REG_RATE];
+    const unsigned popped = ready && room ? odd : 0;
+    u->asked = (struct asked){hm2_plan_requests(u->port.plan) + 1u, popped, ready && room};
+    const unsigned address = popped ? u->rx[REG_DATA] + SIZE_STRIDE * (popped - 1u) : u->rx[REG_RATE];
     hm2_put_le16(u->first.address, (uint16_t)address);
     const unsigned four = u->rx[REG_DATA] + SIZE_STRIDE * (POP_BYTES - 1u);
     for (unsigned i = 0; i < POPS; i++)
-        hm2_put_le16(u->in[i].address, u->in_aimed ? (uint16_t)four : u->rx[REG_RATE]);
+        hm2_put_le16(u->in[i].address, u->asked.fours ? (uint16_t)four : u->rx[REG_RATE]);
 }
 
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -271,6 +331,7 @@ const struct hm2_module_type hm2_uart_type = {
     .unpack = unpack,
     .pack = pack,
     .write_lost = write_lost,
+    .late = late,
     .groups = groups,
 };
 

@@ -131,12 +131,127 @@ static void a_full_ring_takes_no_more(void **state)
     sim_bench_free(bench);
 }
 
+/* ---- replies that are late or lost ------------------------------------------------------------------------------- */
+
+struct weather {
+    struct sim_bench *bench;
+    unsigned cycle;
+    bool loses;
+};
+
+/* Every fifth reply comes a period late, sometimes two in a row; one in a hundred never does. */
+static void blow(void *context, const uint8_t *data, size_t len, bool done)
+{
+    const struct weather *const w = context;
+    struct sim_faults faults = {.seed = 1};
+    (void)data;
+    (void)len;
+    if (done)
+        return;
+    if (w->loses && w->cycle % 100 == 50)
+        faults.loss = 1.0;
+    else if (w->cycle % 5 == 2 || w->cycle % 25 == 8)
+        faults.delay_min_ns = faults.delay_max_ns = BENCH_PERIOD_NS;
+    assert_int_equal(sim_net_set_faults(w->bench->net, &faults), 0);
+}
+
+static void cycle_in(struct weather *w)
+{
+    static const struct sim_faults calm = {.seed = 1};
+    struct sim_bench *const bench = w->bench;
+    w->cycle++;
+    hm2_board_read(bench->board, BENCH_PERIOD_NS);
+    assert_int_equal(sim_net_set_faults(bench->net, &calm), 0);
+    hm2_board_write(bench->board, BENCH_PERIOD_NS);
+    bench->now_ns += BENCH_PERIOD_NS;
+    sim_net_sleep_until(bench->net, bench->now_ns);
+    assert_int_equal(sim_net_set_faults(bench->net, &calm), 0);
+}
+
+static void ignore(void *context, uint8_t byte)
+{
+    (void)context;
+    (void)byte;
+}
+
+struct outcome {
+    size_t got, end; /* bytes; place behind the last of them in what was sent */
+    uint64_t lost_replies;
+    struct hm2_serial_counts counts;
+};
+
+/* The world outside sends `bytes` numbers of its own, 8 a period: the rest of it ends the frame. */
+static struct outcome receive_in(const struct loop *loop, const bool loses)
+{
+    struct sim_bench *const bench = sim_bench_new("7i80hd-16", loop->firmware, "");
+    struct hm2_serial *const port = open_port(bench, loop);
+    struct weather w = {bench, 0, loses};
+    assert_int_equal(sim_card_serial(bench->card, loop->gtag, 0, ignore, NULL), 0);
+    struct outcome out = {0};
+    for (unsigned i = 0; i < 20; i++)
+        sim_bench_cycle(bench);
+    sim_net_on_taken(bench->net, blow, &w);
+    size_t put = 0;
+    for (unsigned idle = 0; idle < 50; idle++) {
+        uint8_t bytes[512];
+        for (unsigned i = 0; i < 8 && put < loop->bytes; i++, put++, idle = 0) {
+            const uint8_t byte = (uint8_t)put;
+            assert_int_equal(sim_card_serial_put(bench->card, loop->gtag, 0, &byte, 1), 1);
+        }
+        cycle_in(&w);
+        const size_t n = hm2_serial_get(port, bytes, sizeof bytes);
+        /* Bytes are numbered modulo 256: one that is repeated or out of order takes the end beyond what was sent. */
+        for (size_t i = 0; i < n; i++)
+            out.end += (uint8_t)(bytes[i] - (uint8_t)out.end) + 1u;
+        out.got += n;
+    }
+    out.counts = hm2_serial_counts(port);
+    out.lost_replies = sim_net_truth(bench->net).lost[1];
+    sim_bench_free(bench);
+    return out;
+}
+
+static const struct loop stormy[] = {
+    {"SVUA8_8_72", HM2_SERIAL_UART, HM2_GTAG_UART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000},
+    {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000},
+    {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_EVEN, HM2_DRIVE_ON, 6000},
+};
+
+static void late_replies_cost_no_byte(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof stormy / sizeof stormy[0]; i++) {
+        const struct outcome out = receive_in(&stormy[i], false);
+        if (out.got != stormy[i].bytes || out.end != stormy[i].bytes || out.counts.rx_uncertain ||
+            out.counts.rx_overruns)
+            fail_msg("row %zu: %zu bytes, end %zu, uncertain %u, overruns %u", i, out.got, out.end,
+                     out.counts.rx_uncertain, out.counts.rx_overruns);
+    }
+}
+
+static void lost_replies_are_counted_and_what_arrives_is_in_order(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < 2; i++) { /* at 1 Mbaud a frame that the clear cuts may be passed on damaged */
+        const struct outcome out = receive_in(&stormy[i], true);
+        const size_t missing = stormy[i].bytes - out.got;
+        if (out.lost_replies == 0 || missing == 0 || out.end > stormy[i].bytes || stormy[i].bytes - out.end > 100 ||
+            out.counts.rx_uncertain == 0)
+            fail_msg("row %zu: %zu bytes, end %zu, uncertain %u, replies lost %u", i, out.got, out.end,
+                     out.counts.rx_uncertain, (unsigned)out.lost_replies);
+        if (stormy[i].kind == HM2_SERIAL_UART && missing > out.counts.rx_uncertain)
+            fail_msg("%zu bytes are missing, %u counted", missing, out.counts.rx_uncertain);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_loop_brings_every_byte_back),
         cmocka_unit_test(settings_that_the_firmware_cannot_keep_are_refused),
         cmocka_unit_test(a_full_ring_takes_no_more),
+        cmocka_unit_test(late_replies_cost_no_byte),
+        cmocka_unit_test(lost_replies_are_counted_and_what_arrives_is_in_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

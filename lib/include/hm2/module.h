@@ -105,6 +105,9 @@ struct hm2_module_type {
     /* After the reply was judged fresh but before unpack, a write had been lost: modules with self-clearing bits
      * learn here that what they sent did not arrive. Most need nothing (sections are resent). May be NULL. */
     void (*write_lost)(struct hm2_module *module);
+    /* A reply to the request of this number (hm2_plan_requests()) has come after it was given up; while this runs, the
+     * windows show it. For FIFOs, whose words come only once: anything else in it is out of date. May be NULL. */
+    void (*late)(struct hm2_module *module, uint64_t request);
     /* HAL name of an output pin of this module ("step"), from which a port makes the second names of the pin's
      * parameters ("stepgen.00.step.invert_output", hal-interface 2.3). NULL for a pin that has no such name, e.g. an
      * input; the function itself may be NULL when no pin has one. */

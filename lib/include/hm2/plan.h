@@ -155,6 +155,14 @@ HM2_API size_t hm2_plan_reply_bytes(const struct hm2_plan *plan);
  * else arrives; it also settles the set-up sections: confirmed or dirty again. A datagram that did not fit into the
  * buffer may be judged with any len above hm2_plan_reply_bytes(). */
 HM2_API enum hm2_reply hm2_plan_judge(struct hm2_plan *plan, size_t len);
+/* Requests made so far: the next one is one more. For modules whose reads take something away (FIFOs) and must know a
+ * late reply as the answer to theirs. */
+HM2_API uint64_t hm2_plan_requests(const struct hm2_plan *plan);
+/* Right after hm2_plan_judge() said LATE: the number of the request it answers. 0 when its words cannot be read,
+ * because it is too old (64 requests) or was made before hm2_plan_reopen(). */
+HM2_API uint64_t hm2_plan_late_request(const struct hm2_plan *plan);
+/* Then: the read windows show the late reply until the next call, which brings the last fresh one back. */
+HM2_API void hm2_plan_swap_late(struct hm2_plan *plan);
 /* The outstanding request is given up; a reply that still comes counts as LATE. */
 HM2_API void hm2_plan_give_up(struct hm2_plan *plan);
 

@@ -34,9 +34,9 @@ struct hm2_serial_settings {
 /* What was lost, and why. */
 struct hm2_serial_counts {
     uint32_t rx_bytes, tx_bytes;
-    uint32_t rx_errors;    /* false starts, missing stop bits, wrong parity */
+    uint32_t rx_errors;    /* false starts, missing stop bits, wrong parity; frames dropped after a lost reply */
     uint32_t rx_overruns;  /* the card's buffers ran over, or no longer made sense, and were cleared */
-    uint32_t rx_uncertain; /* bytes that the card had given when the reply with them was lost */
+    uint32_t rx_uncertain; /* bytes that the card may have given in a reply that was lost (late ones are used) */
     uint32_t tx_uncertain; /* bytes of which nobody knows whether they were sent, for the same reason */
 };
 
