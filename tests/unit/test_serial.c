@@ -232,7 +232,7 @@ static void late_replies_cost_no_byte(void **state)
 static void lost_replies_are_counted_and_what_arrives_is_in_order(void **state)
 {
     (void)state;
-    for (size_t i = 0; i < 2; i++) { /* at 1 Mbaud a frame that the clear cuts may be passed on damaged */
+    for (size_t i = 0; i < 2; i++) { /* hm2_pty(9) tells what is not kept at 1 Mbaud */
         const struct outcome out = receive_in(&stormy[i], true);
         const size_t missing = stormy[i].bytes - out.got;
         if (out.lost_replies == 0 || missing == 0 || out.end > stormy[i].bytes || stormy[i].bytes - out.end > 100 ||
