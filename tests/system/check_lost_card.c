@@ -38,7 +38,6 @@ START_TEST(a_lost_card_comes_back_without_a_restart)
     set("PEER_CARD", "hm2_7i96s.0");
     set("PEER_MODULES", TEST_BUILD "/linuxcnc");
     set("PEER_TIMEOUT", "1100");
-    set("LOSE_CARD", TEST_SOURCE "/tests/system/linuxcnc/lose-card");
     set("LOSE_SECONDS", seconds ? seconds : "1");
     process_run(&run, argv, LIMIT_MS);
     if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
