@@ -10,20 +10,20 @@
 
 #include <rtapi.h>
 
-#define POLL_NS     100000000L
 #define STACK_BYTES (256 << 10)
 
 static pthread_t messenger;
 static bool runs;
 static atomic_bool ends;
-static void (*printer)(void);
+static void (*job)(void);
+static long job_pause_ns;
 
 static void *messenger_main(void *const unused)
 {
-    const struct timespec pause = {.tv_nsec = POLL_NS};
+    const struct timespec pause = {.tv_nsec = job_pause_ns};
     (void)unused;
     while (!atomic_load(&ends)) {
-        printer();
+        job();
         nanosleep(&pause, NULL);
     }
     return NULL;
@@ -50,13 +50,14 @@ static int create(void)
     return result;
 }
 
-int messenger_start(const char *const component, void (*const print)(void))
+int messenger_start(const char *const component, void (*const work)(void), const long pause_ns)
 {
-    printer = print;
+    job = work;
+    job_pause_ns = pause_ns;
     atomic_store(&ends, false);
     const int result = create();
     if (result != 0) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "%s: no thread for messages: %s\n", component, strerror(result));
+        rtapi_print_msg(RTAPI_MSG_ERR, "%s: no thread beside the cycle: %s\n", component, strerror(result));
         return -result;
     }
     runs = true;

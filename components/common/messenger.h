@@ -1,15 +1,18 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What components say outside the realtime threads: a thread of normal priority that prints, and the sentences of a
- * load.
+ * What components do outside the realtime threads: a thread of normal priority that prints or carries bytes, and the
+ * sentences of a load.
  */
 #ifndef MESSENGER_H
 #define MESSENGER_H
 
 #include <hm2/err.h>
 
-/* Call print() ten times a second until messenger_stop(). 0, or a negative errno with a message. */
-int messenger_start(const char *component, void (*print)(void));
+#define MESSENGER_PRINTS_NS 100000000L /* often enough for people */
+
+/* Call work() again and again, with pauses of pause_ns (below a second), until messenger_stop(). 0, or a negative errno
+ * with a message. */
+int messenger_start(const char *component, void (*work)(void), long pause_ns);
 /* Nothing when it does not run. */
 void messenger_stop(void);
 

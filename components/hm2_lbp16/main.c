@@ -501,7 +501,7 @@ int rtapi_app_main(void)
     atomic_store(&closing, false);
     int result = load_cards();
     if (result == 0)
-        result = messenger_start("hm2_lbp16", look_after_cards);
+        result = messenger_start("hm2_lbp16", look_after_cards, MESSENGER_PRINTS_NS);
     if (result == 0)
         result = hal_ready(component_id);
     if (result < 0)

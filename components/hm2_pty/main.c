@@ -9,14 +9,9 @@
  */
 #include <errno.h>
 #include <fcntl.h>
-#include <pthread.h>
-#include <sched.h>
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <termios.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <hal.h>
@@ -27,6 +22,7 @@
 #include <hm2/serial.h>
 
 #include "common/hal_binder.h"
+#include "common/messenger.h"
 
 MODULE_AUTHOR("libhm2 developers");
 MODULE_DESCRIPTION("serial ports of Mesa cards as terminals");
@@ -35,8 +31,7 @@ MODULE_LICENSE("GPL");
 #define MAX_PORTS    16
 #define CHUNK        1024u
 #define TX_LIMIT     4096u /* bytes that may wait for the card */
-#define POLL_MS      1
-#define STACK_BYTES  (256 << 10)
+#define CARRY_NS     1000000L
 #define DEFAULT_BAUD 115200
 
 static char *ports[MAX_PORTS];
@@ -87,9 +82,6 @@ static int component_id;
 static struct hal_binder hal;
 static struct terminal *terminals[MAX_PORTS];
 static unsigned count;
-static pthread_t carrier;
-static bool carrier_runs;
-static atomic_bool carrier_ends;
 
 /* ---- the thread
  * ------------------------------------------------------------------------------------------------------ */
@@ -131,50 +123,13 @@ static void show_counts(const struct terminal *const t)
     *t->tx_uncertain = counts.tx_uncertain;
 }
 
-static void *carry(void *const unused)
+static void carry(void)
 {
-    const struct timespec pause = {.tv_nsec = POLL_MS * 1000000L};
-    (void)unused;
-    while (!atomic_load(&carrier_ends)) {
-        for (unsigned i = 0; i < count; i++) {
-            to_card(terminals[i]);
-            to_terminal(terminals[i]);
-            show_counts(terminals[i]);
-        }
-        nanosleep(&pause, NULL);
+    for (unsigned i = 0; i < count; i++) {
+        to_card(terminals[i]);
+        to_terminal(terminals[i]);
+        show_counts(terminals[i]);
     }
-    return NULL;
-}
-
-static int start_carrier(void)
-{
-    const struct sched_param normal = {.sched_priority = 0};
-    pthread_attr_t attributes;
-    sigset_t all, before;
-    int result = pthread_attr_init(&attributes);
-    if (result != 0)
-        return -result;
-    atomic_store(&carrier_ends, false);
-    (void)pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-    (void)pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
-    (void)pthread_attr_setschedparam(&attributes, &normal);
-    (void)pthread_attr_setstacksize(&attributes, (size_t)STACK_BYTES);
-    (void)sigfillset(&all);
-    (void)pthread_sigmask(SIG_SETMASK, &all, &before);
-    result = pthread_create(&carrier, &attributes, carry, NULL);
-    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
-    (void)pthread_attr_destroy(&attributes);
-    carrier_runs = result == 0;
-    return -result;
-}
-
-static void stop_carrier(void)
-{
-    if (!carrier_runs)
-        return;
-    atomic_store(&carrier_ends, true);
-    pthread_join(carrier, NULL);
-    carrier_runs = false;
 }
 
 /* ---- load
@@ -263,7 +218,7 @@ static int load_terminal(const unsigned i)
 
 static void unload(void)
 {
-    stop_carrier();
+    messenger_stop();
     for (unsigned i = 0; i < count; i++) {
         if (terminals[i]->link[0])
             (void)unlink(terminals[i]->link);
@@ -288,7 +243,7 @@ int rtapi_app_main(void)
     for (unsigned i = 0; !result && i < MAX_PORTS && ports[i] && ports[i][0]; i++)
         result = load_terminal(i);
     if (!result)
-        result = start_carrier();
+        result = messenger_start("hm2_pty", carry, CARRY_NS);
     if (!result)
         result = hal_ready(component_id);
     if (result < 0)

@@ -285,7 +285,7 @@ int rtapi_app_main(void)
     atomic_store(&closing, false);
     int result = load_buses();
     if (result == 0)
-        result = messenger_start("ppmc_epp", print_messages);
+        result = messenger_start("ppmc_epp", print_messages, MESSENGER_PRINTS_NS);
     if (result == 0)
         result = hal_ready(component_id);
     if (result < 0)
