@@ -417,7 +417,7 @@ static void a_restarted_card_starts_its_remotes_again(void **state)
     set(f, "7i77.0.0.output-00", 1);
     cycles(f, 3);
     sim_card_power_cycle(f->card);
-    for (unsigned i = 0; i < 2000 && !get(f, "watchdog.has_bit"); i++) {
+    for (unsigned i = 0; i < 2000 && get(f, "watchdog.has_bit") == 0.0; i++) {
         cycle(f);
         set(f, "io_error", 0);
     }
