@@ -109,8 +109,9 @@ void serial_pair_advance(const struct serial_pair *const pair, struct sim_module
         rx->advancing = true;
     while ((tx && tx->clk < clk) || (rx && rx->clk < clk)) {
         int64_t to = clk;
-        if (tx && rx && pair->tx_event(tx) + 1 < clk && pair->tx_event(tx) != SIM_NEVER)
-            to = pair->tx_event(tx) + 1;
+        const int64_t event = tx && rx ? pair->tx_event(tx) : SIM_NEVER;
+        if (event < clk - 1)
+            to = event + 1;
         if (rx && rx->clk < to)
             pair->rx_step(rx, to);
         if (tx && tx->clk < to)
