@@ -69,12 +69,21 @@ static bool parse_cause(const struct text_span word, enum hm2_flight_cause *cons
     return false;
 }
 
+static bool is_printable(const struct text_span word)
+{
+    for (const char *c = word.at; c < word.end; c++)
+        if (*c <= ' ' || *c > '~')
+            return false;
+    return true;
+}
+
 static bool parse_head(struct text_span line, struct hm2_flight_head *const head)
 {
     struct text_span word;
     uint64_t version, period, cycle;
     if (!text_next_word(&line, &word) || !text_is(word, "hm2flight") || !next_number(&line, VERSION, &version) ||
-        version != VERSION || !text_next_word(&line, &word) || (size_t)(word.end - word.at) >= sizeof head->card)
+        version != VERSION || !text_next_word(&line, &word) || (size_t)(word.end - word.at) >= sizeof head->card ||
+        !is_printable(word))
         return false;
     memset(head->card, 0, sizeof head->card);
     memcpy(head->card, word.at, (size_t)(word.end - word.at));
