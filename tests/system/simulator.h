@@ -32,4 +32,8 @@ char simulator_pad(const struct simulator *sim, unsigned card, unsigned io);
 /* A HostMot2 register, over UDP like any client. */
 uint32_t simulator_read(const struct simulator *sim, unsigned card, unsigned address);
 
+/* False, and the reason printed as a skip, where LinuxCNC's own driver cannot be judge: it gives up when one of the
+ * thousands of replies of its set-up comes late, and a sanitizer makes a card late. */
+bool simulator_suits_linuxcnc(void);
+
 #endif
