@@ -15,11 +15,12 @@
 #define NS_PER_MS        1000000
 #define SERIAL_BITS      24
 
-static const struct remote_kind *const kinds[] = {&remote_7i77_field, &remote_7i77d_field, &remote_7i77_analog,
-                                                  &remote_7i76,       &remote_7i84,        &remote_7i84d,
-                                                  &remote_7i90};
+static const struct remote_kind *const kinds[] = {
+    &remote_7i77_field, &remote_7i77d_field, &remote_7i77_analog, &remote_7i76, &remote_7i84, &remote_7i84d,
+    &remote_7i90,       &remote_7i69,        &remote_7i70,        &remote_7i71, &remote_7i72, &remote_7i73};
 
-static const char *const names[] = {"7i77-field", "7i77d-field", "7i77-analog", "7i76", "7i84", "7i84d", "7i90", NULL};
+static const char *const names[] = {"7i77-field", "7i77d-field", "7i77-analog", "7i76", "7i84", "7i84d", "7i90",
+                                    "7i69",       "7i70",        "7i71",        "7i72", "7i73", NULL};
 
 const char *const *remote_names(void)
 {

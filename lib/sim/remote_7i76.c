@@ -4,24 +4,23 @@
 #include "remote_kind.h"
 
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
-#define FULL_SCALE_V 36.3f
 
 enum { ALL_MODES = 0x7, ANALOG_MODES = 0x6, MPG_MODE = 0x4 };
 
 static const struct remote_field fields[] = {
-    {"Input", "", 32, REMOTE_BITS, REMOTE_IN, ALL_MODES, REMOTE_AT_INPUTS, 0, 0},
-    {"Output", "", 16, REMOTE_BITS, REMOTE_OUT, ALL_MODES, REMOTE_AT_OUTPUTS, 0, 0},
+    {REMOTE_INPUTS(32, ALL_MODES)},
+    {REMOTE_OUTPUTS(16, ALL_MODES)},
     {"SpinOut", "Percent", 12, REMOTE_UNSIGNED, REMOTE_OUT, ALL_MODES, REMOTE_AT_OUTPUTS + 2, 0, 100},
     {"SpinEna", "", 1, REMOTE_BOOLEAN, REMOTE_OUT, ALL_MODES, REMOTE_AT_OUTPUTS + 4, 0, 0},
     {"SpinDir", "", 1, REMOTE_BOOLEAN, REMOTE_OUT, ALL_MODES, REMOTE_AT_OUTPUTS + 5, 0, 0},
     {"", "", 2, REMOTE_PAD, REMOTE_OUT, ALL_MODES, REMOTE_AT_OUTPUTS + 6, 0, 0},
-    {"AnalogIn0", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, ANALOG_MODES, REMOTE_AT_INPUTS + 4, 0, FULL_SCALE_V},
-    {"AnalogIn1", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, ANALOG_MODES, REMOTE_AT_INPUTS + 5, 0, FULL_SCALE_V},
-    {"AnalogIn2", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, ANALOG_MODES, REMOTE_AT_INPUTS + 6, 0, FULL_SCALE_V},
-    {"AnalogIn3", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, ANALOG_MODES, REMOTE_AT_INPUTS + 7, 0, FULL_SCALE_V},
-    {"FieldVoltage", "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, ANALOG_MODES, REMOTE_AT_INPUTS + 8, 0, FULL_SCALE_V},
-    {"Enc0", "", 8, REMOTE_ENCODER, REMOTE_IN, MPG_MODE, REMOTE_AT_INPUTS + 9, 0, 0},
-    {"Enc1", "", 8, REMOTE_ENCODER, REMOTE_IN, MPG_MODE, REMOTE_AT_INPUTS + 10, 0, 0},
+    {REMOTE_VOLTS("AnalogIn0", 4, ANALOG_MODES)},
+    {REMOTE_VOLTS("AnalogIn1", 5, ANALOG_MODES)},
+    {REMOTE_VOLTS("AnalogIn2", 6, ANALOG_MODES)},
+    {REMOTE_VOLTS("AnalogIn3", 7, ANALOG_MODES)},
+    {REMOTE_VOLTS("FieldVoltage", 8, ANALOG_MODES)},
+    {REMOTE_COUNTER("Enc0", 9, MPG_MODE)},
+    {REMOTE_COUNTER("Enc1", 10, MPG_MODE)},
 };
 
 static const struct remote_enable enables[] = {{"SpinOut", "SpinEna"}};

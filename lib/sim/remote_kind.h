@@ -33,7 +33,8 @@ enum remote_address {
     REMOTE_AT_NV_BAUD = 0x6C0,
     REMOTE_AT_NV_UNIT_NUMBER = 0x6C4,
     REMOTE_AT_NV_WATCHDOG = 0x6C8,
-    REMOTE_NV_BYTES = 0x10,
+    REMOTE_AT_NV_OWN = 0x6D0, /* what only some kinds have */
+    REMOTE_NV_BYTES = 0x20,
 };
 
 struct remote_field {
@@ -43,6 +44,15 @@ struct remote_field {
     uint16_t address;
     float min, max;
 };
+
+/* Rows that many tables have: digital inputs and outputs, an analog input, an MPG counter; `at` bytes behind the first
+ * input. Analog inputs and field voltage have the full scale of seed 003, "ANALOG INPUTS". */
+#define REMOTE_FULL_SCALE_V          36.3f
+#define REMOTE_INPUTS(count, modes)  "Input", "", count, REMOTE_BITS, REMOTE_IN, modes, REMOTE_AT_INPUTS, 0, 0
+#define REMOTE_OUTPUTS(count, modes) "Output", "", count, REMOTE_BITS, REMOTE_OUT, modes, REMOTE_AT_OUTPUTS, 0, 0
+#define REMOTE_VOLTS(name, at, modes) \
+    name, "Volts", 8, REMOTE_UNSIGNED, REMOTE_IN, modes, REMOTE_AT_INPUTS + (at), 0, REMOTE_FULL_SCALE_V
+#define REMOTE_COUNTER(name, at, modes) name, "", 8, REMOTE_ENCODER, REMOTE_IN, modes, REMOTE_AT_INPUTS + (at), 0, 0
 
 /* A drive takes its speed from one output and its enable from another. */
 struct remote_enable {
@@ -74,7 +84,7 @@ struct remote_kind {
     struct remote_layout layout;
 };
 
-/* Layout of all of them. */
+/* Layout of most of them; four modes at most. */
 #define REMOTE_LAYOUT                                                                                         \
     {                                                                                                         \
         .ptoc = 0x100, .ptoc_step = 0x40, .gtoc = 0x200, .modes = 0x280, .mode_step = 0x40, .records = 0x800, \
@@ -82,6 +92,6 @@ struct remote_kind {
     }
 
 extern const struct remote_kind remote_7i77_field, remote_7i77d_field, remote_7i77_analog, remote_7i76, remote_7i84,
-    remote_7i84d, remote_7i90;
+    remote_7i84d, remote_7i90, remote_7i69, remote_7i70, remote_7i71, remote_7i72, remote_7i73;
 
 #endif

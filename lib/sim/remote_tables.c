@@ -134,16 +134,17 @@ static void put_ptoc(uint8_t *const memory, const struct remote_kind *const kind
     }
 }
 
-/* Process data is in the global table as well (reference: HAL interface, 4.4). That it is the data of the first mode,
- * so that no mode makes process data of others look like parameters, is an assumption. */
+/* Process data is in the global table as well (reference: HAL interface, 4.4). That it is the data which all modes
+ * have, so that no mode makes process data of others look like parameters, is an assumption. */
 static void put_gtoc(uint8_t *const memory, const struct remote_kind *const kind)
 {
     if (kind->no_parameters)
         return;
+    const unsigned all_modes = (1u << kind->mode_count) - 1u;
     unsigned at = kind->layout.gtoc;
     const struct remote_field *field;
     for (unsigned i = 0; (field = remote_field_at(kind, i)); i++) {
-        if (field->modes != 0 && !(field->modes & 1u))
+        if (field->modes != 0 && field->modes != all_modes)
             continue;
         remote_store(memory, at, record_of(kind, i), 2);
         at += 2;

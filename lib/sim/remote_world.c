@@ -22,14 +22,15 @@ uint64_t remote_applied(const struct remote *const r, const struct remote_field 
     return field->address == REMOTE_AT_OUTPUTS && field->type == REMOTE_BITS ? value & ~(uint64_t)r->tripped : value;
 }
 
-/* Inputs as they are now. Pins with open drains: inputs and outputs are paired by their order. */
+/* Inputs as they are now. Pins with open drains: inputs and outputs are paired by their order. A field at the address
+ * of the one before it is a narrower view of the same input. */
 void remote_sample(struct remote *const r)
 {
     const struct remote_kind *const kind = r->kind;
     const unsigned pairs = kind->field_count / 2;
     for (unsigned i = 0; i < kind->field_count; i++) {
         const struct remote_field *const field = &kind->fields[i];
-        if (field->direction != REMOTE_IN)
+        if (field->direction != REMOTE_IN || (i > 0 && field->address == kind->fields[i - 1].address))
             continue;
         const uint64_t driven = kind->loopback ? remote_applied(r, &kind->fields[i + pairs]) : 0;
         remote_store(r->memory, field->address, r->world[i] | driven, remote_bytes_of(field->bits));

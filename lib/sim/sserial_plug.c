@@ -6,20 +6,17 @@
 
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
-/* Daughter cards: their processors, channel by channel (register map 5.5). */
+/* Daughter cards of more than one processor: these, channel by channel (register map 5.5). */
 static const struct {
     const char *name;
     const char *remotes[2];
 } cards[] = {
-    {"7i76", {"7i76", NULL}},
     {"7i77", {"7i77-field", "7i77-analog"}},
     {"7i77d", {"7i77d-field", "7i77-analog"}},
-    {"7i84", {"7i84", NULL}},
-    {"7i84d", {"7i84d", NULL}},
-    {"7i90", {"7i90", NULL}},
 };
 
-static const char *const card_names[] = {"7i76", "7i77", "7i77d", "7i84", "7i84d", "7i90", NULL};
+static const char *const card_names[] = {"7i69", "7i70",  "7i71", "7i72",  "7i73", "7i76",
+                                         "7i77", "7i77d", "7i84", "7i84d", "7i90", NULL};
 
 const char *const *sim_sserial_cards(void)
 {
@@ -70,7 +67,7 @@ int sim_sserial_plug(struct sim_card *const card, const unsigned port, const uns
         if (strcmp(cards[i].name, name) != 0)
             continue;
         int err = 0;
-        for (unsigned k = 0; k < COUNT(cards[i].remotes) && cards[i].remotes[k] && !err; k++)
+        for (unsigned k = 0; k < COUNT(cards[i].remotes) && !err; k++)
             err = plug_one(card, port, channel + k, cards[i].remotes[k], serial, diag);
         return err;
     }

@@ -20,46 +20,64 @@
 #include "process.h"
 
 #define PEER_LIMIT_MS 60000
+#define PEER_TRIES    5u
 #define CANNOT_RUN    77
 
 #define MAX_OBJECTS 2048u
 
 struct load {
     const char *card, *name, *config;
-    const char *option, *value; /* of hm2sim; NULL = none */
+    const char *options[4]; /* of hm2sim, up to NULL */
 };
 
 #define ABSOLUTE TEST_DATA "/firmware/absolute_48.hex"
+#define SSERIALB TEST_DATA "/firmware/sserialb_51.hex"
 #define DRIVES   TEST_DATA "/firmware/drives_29_48.hex"
 
 static const struct load loads[] = {
-    {"7i96s", "default", "", NULL, NULL},
-    {"7i96s", "no-sserial", "sserial_port_0=xxxxxxxx", NULL, NULL},
-    {"7i96s", "raw", "enable_raw", NULL, NULL},
-    {"7i96s", "fewer", "num_encoders=0 num_stepgens=2 num_pwmgens=0 enable_raw", NULL, NULL},
-    {"7i96s", "no-io-modules", "num_leds=2 num_ssrs=0 num_inms=0 num_outms=0", NULL, NULL},
-    {"7i96s", "nothing",
-     "num_encoders=0 num_stepgens=0 num_pwmgens=0 num_leds=0 num_ssrs=0 num_inms=0 num_outms=0 num_dplls=0", NULL,
-     NULL},
-    {"7i96s", "one-pin-stepgens", "stepgen_width=1 num_leds=3", NULL, NULL},
-    {"7i96s", "too-many-clamped", "num_leds=9 num_dplls=5", NULL, NULL},
-    {"7i96s_7i77d", "7i77-mode-0", "sserial_port_0=00xxxxxx", "--remote", "0:0=7i77"},
-    {"7i96s_7i77d", "7i77-mode-1", "sserial_port_0=10xxxxxx", "--remote", "0:0=7i77"},
-    {"7i96s_7i77d", "7i77-mode-2", "sserial_port_0=20xxxxxx", "--remote", "0:0=7i77"},
-    {"7i96s_7i77d", "7i77-mode-3", "sserial_port_0=30xxxxxx", "--remote", "0:0=7i77"},
-    {"7i96s_7i77d", "7i76-mode-2", "sserial_port_0=2xxxxxxx", "--remote", "0:0=7i76"},
-    {"7i93", "default", "", NULL, NULL},
-    {"7i93", "typical", "num_encoders=3 num_pwmgens=3 num_stepgens=2 sserial_port_0=00000000", NULL, NULL},
-    {"7i93", "no-dpll", "num_dplls=0 enable_raw", NULL, NULL},
-    {"7i93", "encoders-only", "num_pwmgens=0 num_stepgens=0 num_leds=0", NULL, NULL},
-    {"7i93", "wide-stepgens", "stepgen_width=6 firmware=ignored.bit", NULL, NULL},
-    {"7i93", "absolute",
+    {"7i96s", "default", "", {NULL}},
+    {"7i96s", "no-sserial", "sserial_port_0=xxxxxxxx", {NULL}},
+    {"7i96s", "raw", "enable_raw", {NULL}},
+    {"7i96s", "fewer", "num_encoders=0 num_stepgens=2 num_pwmgens=0 enable_raw", {NULL}},
+    {"7i96s", "no-io-modules", "num_leds=2 num_ssrs=0 num_inms=0 num_outms=0", {NULL}},
+    {"7i96s",
+     "nothing",
+     "num_encoders=0 num_stepgens=0 num_pwmgens=0 num_leds=0 num_ssrs=0 num_inms=0 num_outms=0 num_dplls=0",
+     {NULL}},
+    {"7i96s", "one-pin-stepgens", "stepgen_width=1 num_leds=3", {NULL}},
+    {"7i96s", "too-many-clamped", "num_leds=9 num_dplls=5", {NULL}},
+    {"7i96s_7i77d", "7i77-mode-0", "sserial_port_0=00xxxxxx", {"--remote", "0:0=7i77"}},
+    {"7i96s_7i77d", "7i77-mode-1", "sserial_port_0=10xxxxxx", {"--remote", "0:0=7i77"}},
+    {"7i96s_7i77d", "7i77-mode-2", "sserial_port_0=20xxxxxx", {"--remote", "0:0=7i77"}},
+    {"7i96s_7i77d", "7i77-mode-3", "sserial_port_0=30xxxxxx", {"--remote", "0:0=7i77"}},
+    {"7i96s_7i77d", "7i76-mode-2", "sserial_port_0=2xxxxxxx", {"--remote", "0:0=7i76"}},
+    {"7i96s_7i77d", "7i76-mode-0", "sserial_port_0=0xxxxxxx", {"--remote", "0:0=7i76"}},
+    {"7i96s_7i77d", "7i84-mode-2", "sserial_port_0=2xxxxxxx", {"--remote", "0:0=7i84"}},
+    {"7i96s_7i77d", "7i69-mode-0", "sserial_port_0=0xxxxxxx", {"--remote", "0:0=7i69"}},
+    {"7i96s_7i77d", "7i69-mode-1", "sserial_port_0=1xxxxxxx", {"--remote", "0:0=7i69"}},
+    {"7i96s_7i77d", "7i69-mode-3", "sserial_port_0=3xxxxxxx", {"--remote", "0:0=7i69"}},
+    {"7i96s_7i77d", "7i69-mode-4", "sserial_port_0=4xxxxxxx", {"--remote", "0:0=7i69"}},
+    {"7i96s_7i77d", "7i70-mode-1", "sserial_port_0=1xxxxxxx", {"--remote", "0:0=7i70"}},
+    {"7i96s_7i77d", "7i70-mode-2", "sserial_port_0=2xxxxxxx", {"--remote", "0:0=7i70"}},
+    {"7i96s_7i77d", "7i71-mode-1", "sserial_port_0=1xxxxxxx", {"--remote", "0:0=7i71"}},
+    {"7i96s_7i77d", "7i72-mode-0", "sserial_port_0=0xxxxxxx", {"--remote", "0:0=7i72"}},
+    {"7i96s_7i77d", "7i73-mode-2", "sserial_port_0=2xxxxxxx", {"--remote", "0:0=7i73"}},
+    {"7i96s_7i77d", "sserialb", "sserial_port_0=30xxxxxx", {"--firmware", SSERIALB, "--remote", "0:0=7i77"}},
+    {"7i93", "default", "", {NULL}},
+    {"7i93", "typical", "num_encoders=3 num_pwmgens=3 num_stepgens=2 sserial_port_0=00000000", {NULL}},
+    {"7i93", "no-dpll", "num_dplls=0 enable_raw", {NULL}},
+    {"7i93", "encoders-only", "num_pwmgens=0 num_stepgens=0 num_leds=0", {NULL}},
+    {"7i93", "wide-stepgens", "stepgen_width=6 firmware=ignored.bit", {NULL}},
+    {"7i93",
+     "absolute",
      "ssi_chan_0=a%12ub%3fc%1b%2pd%12s ssi_chan_1=pos%25ge biss_chan_1=turns%12hturns%18l fanuc_chan_0=AA64",
-     "--firmware", ABSOLUTE},
-    {"7i93", "no-absolute", "", "--firmware", ABSOLUTE},
-    {"7i93", "drives", "", "--firmware", DRIVES},
-    {"7i93", "fewer-drives", "num_3pwmgens=1 num_rcpwmgens=1 num_oneshots=0 num_xy2mods=0 num_resolvers=4",
-     "--firmware", DRIVES},
+     {"--firmware", ABSOLUTE}},
+    {"7i93", "no-absolute", "", {"--firmware", ABSOLUTE}},
+    {"7i93", "drives", "", {"--firmware", DRIVES}},
+    {"7i93",
+     "fewer-drives",
+     "num_3pwmgens=1 num_rcpwmgens=1 num_oneshots=0 num_xy2mods=0 num_resolvers=4",
+     {"--firmware", DRIVES}},
 };
 #define LOADS (sizeof loads / sizeof loads[0])
 
@@ -100,6 +118,7 @@ static void write_file(const char *const folder, const char *const name, const c
 /* False when this machine cannot run it, which was said then. The output is in run.text. */
 static bool load(const struct load *const load, const char *const driver)
 {
+    const bool theirs_loads = strcmp(driver, "hm2_eth") == 0;
     char folder[256], hal[280], text[1024];
     const char *skip;
     snprintf(folder, sizeof folder, "%s/dropin-names-%s-%s-%s", TEST_BUILD, load->card, load->name, driver);
@@ -107,8 +126,7 @@ static bool load(const struct load *const load, const char *const driver)
     snprintf(text, sizeof text,
              "%sloadrt %s board_ip=192.168.1.121 config=\"%s\"\n"
              "show pin %s\nshow param %s\nshow funct %s\nshow alias %s\n",
-             strcmp(driver, "hm2_eth") == 0 ? "loadrt hostmot2\n" : "", driver, load->config, prefix, prefix, prefix,
-             prefix);
+             theirs_loads ? "loadrt hostmot2\n" : "", driver, load->config, prefix, prefix, prefix, prefix);
     write_file(folder, "load.hal", text);
     snprintf(hal, sizeof hal, "%s/load.hal", folder);
     ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
@@ -117,10 +135,15 @@ static bool load(const struct load *const load, const char *const driver)
                                 folder,
                                 load->card,
                                 hal,
-                                load->option,
-                                load->value,
+                                load->options[0],
+                                load->options[1],
+                                load->options[2],
+                                load->options[3],
                                 NULL};
-    const int status = process_run(&run, argv, PEER_LIMIT_MS);
+    int status = process_run(&run, argv, PEER_LIMIT_MS);
+    /* When a reply takes long at load, as on a busy machine, LinuxCNC's driver gives up or crashes. */
+    for (unsigned i = 1; i < PEER_TRIES && status != 0 && status != CANNOT_RUN && theirs_loads; i++)
+        status = process_run(&run, argv, PEER_LIMIT_MS);
     if (status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
         printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
         return false;
@@ -220,8 +243,8 @@ static void compare_text(const char *const what, const struct object *const obje
 static bool rests(const char *const name)
 {
     static const char *const restless[] = {
-        "gpio.041.in*",      /* of a 7I77: the select line of its encoders */
-        "7i7[67].0.?.fault", /* a remote's watchdog bites, or not yet, while it is asked */
+        "gpio.041.in*",   /* of a 7I77: the select line of its encoders */
+        "7i??.0.?.fault", /* a remote's watchdog bites, or not yet, while it is asked */
     };
     for (size_t i = 0; i < sizeof restless / sizeof restless[0]; i++)
         if (fnmatch(restless[i], name, 0) == 0)
@@ -311,7 +334,7 @@ int main(void)
         return 1;
     Suite *const suite = suite_create("dropin names");
     TCase *const tests = tcase_create("names");
-    tcase_set_timeout(tests, 2.0 * PEER_LIMIT_MS / 1000.0);
+    tcase_set_timeout(tests, (PEER_TRIES + 1.0) * PEER_LIMIT_MS / 1000.0);
     tcase_add_loop_test(tests, every_object_of_linuxcncs_driver_exists_in_ours_with_type_direction_and_default, 0,
                         (int)LOADS);
     tcase_add_test(tests, no_row_of_the_table_is_stale);

@@ -327,6 +327,9 @@ START_TEST(faults_come_and_go_by_command)
     command("faults loss=7", "error: ");
     command("card 1 freeze on", "error: no such card");
     command("explode", "error: commands are");
+    command("freeze on\nfreeze off\n", "ok");
+    command("freeze off\ncard 1 freeze on\nquit", "error: no such card");
+    command("", "error: commands are");
     command("stats", "7i96s@");
     command("quit", "ok");
     ck_assert(process_wait_end(&sim, END_MS));

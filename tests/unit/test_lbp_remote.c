@@ -82,7 +82,8 @@ static uint64_t get(const char *const name)
 /* ---- parameters ---------------------------------------------------------------------------------------------------
  */
 
-static const char *const kinds[] = {"7i77-field", "7i77d-field", "7i77-analog", "7i76", "7i84", "7i84d"};
+static const char *const kinds[] = {"7i77-field", "7i77d-field", "7i77-analog", "7i76", "7i84", "7i84d",
+                                    "7i69",       "7i70",        "7i71",        "7i72", "7i73"};
 
 static void every_parameter_of_every_remote_makes_the_round_trip(void **state)
 {
@@ -107,7 +108,7 @@ static void every_parameter_of_every_remote_makes_the_round_trip(void **state)
             assert_int_equal(after, other);
             written++;
         }
-        assert_true(written >= 6);
+        assert_true(written >= 5); /* of parameters; a 7I70 has no outputs */
         unplug();
     }
 }

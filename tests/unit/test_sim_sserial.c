@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "profiles.h"
+#include "idrom_files.h"
 #include "sim_card.h"
 #include "sserial.h"
 
@@ -497,28 +497,16 @@ static void motors_need_an_encoder_and_an_output(void **state)
 /* ---- plugging -----------------------------------------------------------------------------------------------------
  */
 
-/* No listing of a card with SSerialB is known: the descriptors here are those of SSerial with another tag and registers
- * (register map 3.8.1). */
 static void sserialb_has_seven_registers_a_channel_and_works_alike(void **state)
 {
     (void)state;
     struct hm2_image image;
-    sim_profile_image(sim_profile_find("7i96s"), &image);
-    for (unsigned i = 0; i < HM2_IDROM_WORDS; i++) {
-        if (image.rom[i] == 0x010100C1) {
-            image.rom[i] = 0x010100C6;
-            image.rom[i + 1] = 0x100A5B00;
-            image.rom[i + 2] = 0x3FC;
-        } else if ((image.rom[i] & 0xFFFFFF00) == 0x0300C100) {
-            image.rom[i] += 0x500;
-        }
-    }
+    load_image(TEST_DATA "/firmware/sserialb_51.hex", &image);
     struct rig rig;
-    const struct sim_card_options options = {.profile = "7i96s", .image = &image};
+    const struct sim_card_options options = {.profile = "7i96s_7i77d", .image = &image};
     assert_int_equal(sim_card_new(&rig.card, &options, NULL), 0);
     assert_int_equal(sim_sserial_plug(rig.card, 0, 0, "7i76", 7, NULL), 0);
-    put(&rig, DDR + 4, 1u << 14); /* TB2-18 */
-    put(&rig, ALTSRC + 4, 1u << 14);
+    route(&rig, TRANSMIT);
     wait(&rig, MS);
     assert_int_equal(command(&rig, 0x0800), 0xAA);
     assert_int_equal(command(&rig, 0x2003), 45);

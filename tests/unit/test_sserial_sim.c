@@ -8,6 +8,7 @@
 #include <hm2/sim.h>
 #include <hm2/sslbp.h>
 
+#include "idrom_files.h"
 #include "random.h"
 #include "remote_kind.h"
 #include "sserial.h"
@@ -26,11 +27,12 @@ struct fixture {
     struct hm2_diag diag;
 };
 
-static int set_up(void **state)
+/* image: of other firmware, or NULL. */
+static int set_up_card(void **const state, const struct hm2_image *const image)
 {
     struct fixture *const f = calloc(1, sizeof *f);
     assert_non_null(f);
-    const struct sim_card_options options = {.profile = "7i96s_7i77d", .seed = 1};
+    const struct sim_card_options options = {.profile = "7i96s_7i77d", .seed = 1, .image = image};
     if (sim_card_new(&f->card, &options, &f->diag) != 0)
         fail_msg("%s", f->diag.text);
     assert_int_equal(sim_net_new(&f->net, f->card, NULL), 0);
@@ -41,6 +43,18 @@ static int set_up(void **state)
     assert_non_null(f->plain);
     *state = f;
     return 0;
+}
+
+static int set_up(void **state)
+{
+    return set_up_card(state, NULL);
+}
+
+static int set_up_sserialb(void **state)
+{
+    struct hm2_image image;
+    load_image(TEST_DATA "/firmware/sserialb_51.hex", &image);
+    return set_up_card(state, &image);
 }
 
 static int tear_down(void **state)
@@ -54,10 +68,15 @@ static int tear_down(void **state)
     return 0;
 }
 
+static void plug_card(struct fixture *const f, const char *const name)
+{
+    if (sim_sserial_plug(f->card, 0, FIELD_IO, name, 0x123456, &f->diag) != 0)
+        fail_msg("%s", f->diag.text);
+}
+
 static void plug(struct fixture *const f)
 {
-    if (sim_sserial_plug(f->card, 0, FIELD_IO, "7i77", 0x123456, &f->diag) != 0)
-        fail_msg("%s", f->diag.text);
+    plug_card(f, "7i77");
 }
 
 static int try_load(struct fixture *const f, const char *const config)
@@ -335,6 +354,81 @@ static void a_changed_parameter_is_written_when_the_port_starts_again(void **sta
     assert_false(message(f, "did not take"));
 }
 
+/* ---- other remotes, other firmware ----------------------------------------------------------------------------------
+ */
+
+static void fields_of_48_bits_go_both_ways_beside_counters(void **state)
+{
+    struct fixture *const f = *state;
+    plug_card(f, "7i69");
+    load(f, "sserial_port_0=4xxxxxxx");
+    run(f);
+    set(f, "7i69.0.0.output-00", 1);
+    set(f, "7i69.0.0.output-33", 1);
+    set(f, "7i69.0.0.output-47", 1);
+    assert_int_equal(remote_set(remote(f, 0), "Input", (double)(UINT64_C(1) << 47 | UINT64_C(1) << 32 | 1)), 0);
+    assert_int_equal(remote_set(remote(f, 0), "Enc3", 5), 0);
+    cycles(f, 4);
+    assert_true(at_remote(f, 0, "Output") == (double)(UINT64_C(1) << 47 | UINT64_C(1) << 33 | 1));
+    assert_int_equal(get(f, "7i69.0.0.input-00"), 1);
+    assert_int_equal(get(f, "7i69.0.0.input-31"), 0);
+    assert_int_equal(get(f, "7i69.0.0.input-32"), 1);
+    assert_int_equal(get(f, "7i69.0.0.input-47"), 1);
+    assert_int_equal(get(f, "7i69.0.0.enc3.count"), 5);
+}
+
+static void halves_of_a_48_bit_card_are_its_first_inputs_and_its_last_outputs(void **state)
+{
+    struct fixture *const f = *state;
+    plug_card(f, "7i69");
+    load(f, "sserial_port_0=3xxxxxxx");
+    run(f);
+    assert_null(hm2_plain_find(f->plain, "hm2_7i96s.0.7i69.0.0.input-24"));
+    set(f, "7i69.0.0.output-23", 1);
+    assert_int_equal(remote_set(remote(f, 0), "Input", 1 << 23), 0);
+    cycles(f, 4);
+    assert_int_equal(remote_terminal(remote(f, 0), 47), SIM_HIGH);
+    assert_int_equal(remote_terminal(remote(f, 0), 23), SIM_FLOAT);
+    assert_int_equal(get(f, "7i69.0.0.input-23"), 1);
+}
+
+static void streams_are_carried_as_they_are(void **state)
+{
+    struct fixture *const f = *state;
+    plug_card(f, "7i73");
+    load(f, "sserial_port_0=2xxxxxxx");
+    run(f);
+    set(f, "7i73.0.0.display", 0xA5);
+    set(f, "7i73.0.0.display32", 0xDEADBEEF);
+    assert_int_equal(remote_set(remote(f, 0), "KeyCode", 0x81), 0);
+    cycles(f, 4);
+    assert_int_equal(at_remote(f, 0, "Display"), 0xA5);
+    assert_true(at_remote(f, 0, "Display32") == (double)0xDEADBEEF);
+    assert_int_equal(get(f, "7i73.0.0.keycode"), 0x81);
+}
+
+static void sserialb_drives_the_same_remotes(void **state)
+{
+    struct fixture *const f = *state;
+    plug(f);
+    load(f, "sserial_port_0=300xxxxx");
+    assert_non_null(strstr(f->diag.text, "channel 2: config sserial_port_0 expects a remote in mode 0, none found"));
+    run(f);
+    set(f, "7i77.0.0.output-15", 1);
+    set(f, "7i77.0.1.analogout5", -10);
+    assert_int_equal(remote_set(remote(f, FIELD_IO), "Input", 0x80000000), 0);
+    assert_int_equal(remote_set(remote(f, FIELD_IO), "Enc1", 7), 0);
+    cycles(f, 4);
+    assert_int_equal(at_remote(f, FIELD_IO, "Output"), 0x8000);
+    assert_true(fabs(at_remote(f, ANALOG, "AnalogOut5") + 10) < 0.003);
+    assert_int_equal(get(f, "7i77.0.0.input-31"), 1);
+    assert_int_equal(get(f, "7i77.0.0.enc1.count"), 7);
+    assert_int_equal(sim_sserial_cable(f->card, 0, FIELD_IO, SIM_CABLE_OUT), 0);
+    cycles(f, 3);
+    assert_int_equal(get(f, "7i77.0.0.link-fault"), 1);
+    assert_int_equal(get(f, "7i77.0.1.link-fault"), 0);
+}
+
 /* ---- disturbances --------------------------------------------------------------------------------------------------
  */
 
@@ -582,6 +676,10 @@ int main(void)
         TEST(a_counter_accumulates_past_its_width),
         TEST(run_stops_and_starts_the_port),
         TEST(a_changed_parameter_is_written_when_the_port_starts_again),
+        TEST(fields_of_48_bits_go_both_ways_beside_counters),
+        TEST(halves_of_a_48_bit_card_are_its_first_inputs_and_its_last_outputs),
+        TEST(streams_are_carried_as_they_are),
+        cmocka_unit_test_setup_teardown(sserialb_drives_the_same_remotes, set_up_sserialb, tear_down),
         TEST(a_pulled_cable_stops_its_remote_alone_and_is_reported_within_three_cycles),
         TEST(auto_restart_brings_a_remote_back),
         TEST(a_port_without_remotes_left_is_in_error_until_run_changes),

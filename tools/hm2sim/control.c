@@ -241,6 +241,24 @@ int control_open(const char *const path, int *const fd, struct hm2_diag *const d
     return hm2_diag_add(diag, HM2_ERR_IO, "control socket %s: %s", path, strerror(errno));
 }
 
+/* Lines are commands that follow each other at one moment; the first error ends them. */
+static bool obey(char *const text, struct station *const stations, const unsigned count, const int64_t now_ns,
+                 char reply[const CONTROL_REPLY_SIZE])
+{
+    for (char *line = text, *next; line; line = next) {
+        next = strchr(line, '\n');
+        if (next)
+            *next++ = '\0';
+        if (next && !*next)
+            next = NULL; /* the end of the last line */
+        if (control_command(line, stations, count, now_ns, reply))
+            return true;
+        if (strncmp(reply, "error", 5) == 0)
+            return false;
+    }
+    return false;
+}
+
 bool control_receive(const int fd, struct station *const stations, const unsigned count, const int64_t now_ns)
 {
     char command[512], reply[CONTROL_REPLY_SIZE];
@@ -250,7 +268,7 @@ bool control_receive(const int fd, struct station *const stations, const unsigne
     if (len < 0)
         return false;
     command[len] = '\0';
-    const bool quit = control_command(command, stations, count, now_ns, reply);
+    const bool quit = obey(command, stations, count, now_ns, reply);
     if (from_len > sizeof(sa_family_t)) /* the sender has a name */
         (void)!sendto(fd, reply, strlen(reply), MSG_DONTWAIT | MSG_NOSIGNAL, (const struct sockaddr *)&from, from_len);
     return quit;
