@@ -304,6 +304,7 @@ START_TEST(the_example_counts_exactly_in_linuxcnc)
     say_example();
     if (process_wait_line(&host, "SKIP: ", 2000, &skip)) {
         printf("%s\n", skip);
+        stop_sim();
         return;
     }
     run_example();

@@ -454,6 +454,58 @@ static void a_peer_that_answers_nonsense_is_an_error_and_reads_nothing(void **st
     }
 }
 
+static void a_server_takes_eight_clients_and_no_other_server_at_its_path(void **state)
+{
+    (void)state;
+    struct sim_ppmc_server *server = NULL, *second = NULL;
+    struct hm2_diag diag = {0};
+    struct epp *clients[9] = {NULL};
+    char folder[] = "/tmp/test-epp-XXXXXX", path[64], longest[200];
+    uint8_t at = 0x2F;
+    const struct epp_step step = {EPP_ADDRESS_WRITE, 1, &at};
+    struct epp_done done;
+    int refused = 0;
+    assert_non_null(mkdtemp(folder));
+    (void)snprintf(path, sizeof path, "%s/bus", folder);
+    memset(longest, 'x', sizeof longest - 1);
+    longest[sizeof longest - 1] = '\0';
+    new_bus();
+    assert_int_equal(sim_ppmc_server_open(&server, longest, &diag), HM2_ERR_INVALID);
+    assert_int_equal(sim_ppmc_server_open(&server, "", &diag), HM2_ERR_INVALID);
+    assert_int_equal(sim_ppmc_server_open(&server, path, NULL), 0);
+    assert_int_equal(sim_ppmc_server_open(&second, path, &diag), HM2_ERR_IO);
+    for (unsigned i = 0; i < 9; i++) {
+        assert_int_equal(epp_socket_open(&clients[i], path, 1, NULL), 0);
+        sim_ppmc_server_run(server, bus); /* accepts one, at first the second server, which had tried who listens */
+        sim_ppmc_server_run(server, bus);
+    }
+    for (unsigned i = 0; i < 9; i++) { /* the first eight are heard, and nobody is there to answer them in time */
+        refused += epp_run(clients[i], &step, 1, &done) == HM2_ERR_IO;
+        epp_close(clients[i]);
+    }
+    assert_int_equal(refused, 1);
+    sim_ppmc_server_run(server, bus);
+    assert_int_equal(sim_ppmc_stats(bus).cycles, 8);
+    sim_ppmc_server_close(server);
+    assert_int_equal(rmdir(folder), 0); /* it has removed its socket */
+}
+
+static void a_socket_that_a_killed_server_left_is_replaced(void **state)
+{
+    (void)state;
+    struct sim_ppmc_server *server = NULL;
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    char folder[] = "/tmp/test-epp-XXXXXX";
+    const int fd = socket(AF_UNIX, SOCK_SEQPACKET, 0);
+    assert_non_null(mkdtemp(folder));
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/bus", folder);
+    assert_int_equal(bind(fd, (const struct sockaddr *)&address, sizeof address), 0);
+    close(fd);
+    assert_int_equal(sim_ppmc_server_open(&server, address.sun_path, NULL), 0);
+    sim_ppmc_server_close(server);
+    assert_int_equal(rmdir(folder), 0);
+}
+
 static void requests_that_are_none_are_not_answered(void **state)
 {
     (void)state;
@@ -495,6 +547,8 @@ int main(void)
         cmocka_unit_test_teardown(names_of_no_bus_are_refused, clean_up),
         cmocka_unit_test_teardown(a_simulators_socket_is_a_bus, clean_up),
         cmocka_unit_test_teardown(a_peer_that_answers_nonsense_is_an_error_and_reads_nothing, clean_up),
+        cmocka_unit_test_teardown(a_server_takes_eight_clients_and_no_other_server_at_its_path, clean_up),
+        cmocka_unit_test_teardown(a_socket_that_a_killed_server_left_is_replaced, clean_up),
         cmocka_unit_test_teardown(requests_that_are_none_are_not_answered, clean_up),
     };
     return cmocka_run_group_tests_name("EPP", tests, NULL, NULL);
