@@ -7,6 +7,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <signal.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -161,13 +162,28 @@ END_TEST
 /* ---- the example in a host -----------------------------------------------------------------------------------------
  */
 
+/* How many cycles of the boards at all rates are wanted, and from how many on the servo thread runs faster than the
+ * example's. PPMC_CYCLES=1000000 takes four minutes in each host. */
+#define SHORT_RUN 4000ul
+
+static unsigned long wanted_cycles(void)
+{
+    const char *const asked = getenv("PPMC_CYCLES");
+    const unsigned long cycles = asked ? strtoul(asked, NULL, 10) : 0;
+    return cycles > SHORT_RUN ? cycles : SHORT_RUN;
+}
+
 /* All of the example up to its start, as commands of standard input. */
 static void say_example(void)
 {
+    static const char period[] = "period1=1000000", fast[] = "period1=200000";
     char line[256];
     FILE *const file = fopen(TEST_SOURCE "/examples/ppmc-encoders.hal", "r");
     ck_assert_ptr_nonnull(file);
     while (fgets(line, sizeof line, file)) {
+        char *const at = strstr(line, period);
+        if (at && wanted_cycles() > SHORT_RUN)
+            snprintf(at, sizeof line - (size_t)(at - line), "%s\n", fast);
         process_say(&host, line);
         if (strcmp(line, "start\n") == 0)
             break;
@@ -213,16 +229,30 @@ static void expect_pin(const char *const pin, const double wanted)
     expect_near(pin, wanted, 0);
 }
 
-static void wait_for_cycles(void)
+#define BOARDS 2u
+
+/* Latch pulses of both boards, one a cycle each. */
+static unsigned long cycles_so_far(void)
 {
-    unsigned long cycles = 0;
-    for (unsigned i = 0; i < LOOKS && cycles < 5000 && !host.ended; i++) {
-        (void)process_wait_line(&host, "never printed", 50, NULL);
-        (void)sscanf(ask_sim("stats"), "cycles %lu", &cycles);
+    unsigned long latches = 0;
+    (void)sscanf(ask_sim("stats"), "cycles %*u unanswered %*u latches %lu", &latches);
+    return latches / BOARDS;
+}
+
+static void wait_for_cycles(const unsigned long count)
+{
+    const unsigned long end = cycles_so_far() + count;
+    unsigned long now = 0, before = 0;
+    for (unsigned idle = 0; now < end && idle < LOOKS; idle++) {
+        usleep(count > SHORT_RUN ? 10 * LOOK_US : LOOK_US);
+        now = cycles_so_far();
+        if (now > before)
+            idle = 0;
+        before = now;
     }
-    if (cycles < 5000) {
+    if (now < end) {
         printf("%s\n", host.text);
-        ck_abort_msg("the example does not run");
+        ck_abort_msg("the example does not run: %lu cycles", now);
     }
 }
 
@@ -232,37 +262,67 @@ static void compare_all(void)
     char pin[64];
     for (unsigned i = 0; i < 7; i++) {
         snprintf(pin, sizeof pin, "ppmc.0.encoder.%02u.count", i);
-        expect_pin(pin, (double)truth(axes[i], "counted"));
+        expect_pin(pin, (int32_t)truth(axes[i], "counted"));
     }
-    expect_pin("ppmc.0.encoder.07.count", (double)(truth("4.3", "counted") - truth("4.3", "preset-at")));
+    expect_pin("ppmc.0.encoder.07.count", (int32_t)(truth("4.3", "counted") - truth("4.3", "preset-at")));
 }
 
-static void turn_all(const unsigned tenths)
+/* Edges a second of encoders 0 to 6 in each part of a run, up to the limit of the filter; encoder 7 meets its index a
+ * few times a second. */
+static const struct {
+    int rates[7], with_index;
+} phases[] = {
+    {{9000000, -500000, 1000, -33, 123456, 0, 7}, -20000},
+    {{10000000, -10000000, 9999999, -2500000, 5000000, 1, -1}, 20000},
+    {{0, 37, -999999, 10000000, -10000000, 1000000, -12345}, -30000},
+    {{-10000000, 10000000, -10000000, 10000000, -10000000, 10000000, -10000000}, 25000},
+};
+#define PHASES (sizeof phases / sizeof phases[0])
+
+static void turn(const unsigned encoder, const int rate)
 {
-    static const char *const axes[] = {"2.0 9000000", "2.1 -500000", "2.2 1000", "2.3 -33", "4.0 123456", "4.3 -20000"};
     char command[64];
-    for (unsigned i = 0; i < 6; i++) {
-        snprintf(command, sizeof command, "rate %s", axes[i]);
-        tell_sim(command);
-    }
-    usleep(tenths * 100000);
-    for (unsigned i = 0; i < 6; i++) {
-        snprintf(command, sizeof command, "rate %.3s 0", axes[i]);
-        tell_sim(command);
-    }
+    snprintf(command, sizeof command, "rate %u.%u %d", encoder < 4 ? 2u : 4u, encoder % 4, rate);
+    tell_sim(command);
+}
+
+static void turn_all(const unsigned phase, const bool on)
+{
+    for (unsigned i = 0; i < 7; i++)
+        turn(i, on ? phases[phase].rates[i] : 0);
+    turn(7, on ? phases[phase].with_index : 0);
+}
+
+static void run_phase(const unsigned phase, const unsigned long cycles)
+{
+    const int64_t presets = truth("4.3", "presets");
+    process_say(&host, "setp ppmc.0.encoder.07.index-enable 1\n");
+    expect_pin("ppmc.0.encoder.07.index-enable", 1);
+    turn_all(phase, true);
+    wait_for_cycles(cycles);
+    expect_pin("ppmc.0.encoder.07.index-enable", 0);
+    turn_all(phase, false);
+    ck_assert_int_gt(truth("4.3", "presets"), presets);
+    compare_all();
 }
 
 static void run_example(void)
 {
-    wait_for_cycles();
+    wait_for_cycles(1000);
     expect_pin("ppmc.0.encoder.07.index-enable", 1);
-    turn_all(10);
-    compare_all();
-    ck_assert_int_eq(truth("4.3", "presets"), 1);
-    expect_pin("ppmc.0.encoder.07.index-enable", 0);
-    expect_near("ppmc.0.encoder.00.position", (double)truth("2.0", "counted") / 1000, 0.1); /* of six digits */
+    const unsigned long start = cycles_so_far();
+    for (unsigned i = 0; i < PHASES; i++)
+        run_phase(i, wanted_cycles() / PHASES);
+    expect_near("ppmc.0.encoder.00.position", (double)truth("2.0", "counted") / 1000,
+                fabs((double)truth("2.0", "counted")) * 1e-8); /* of six digits */
+    if (wanted_cycles() > SHORT_RUN)
+        printf("%lu cycles, counted %" PRId64 " to %" PRId64 ", no difference; timeouts %g, bad data %g\n",
+               cycles_so_far() - start, truth("2.1", "counted"), truth("2.0", "counted"), look_at("ppmc.0.timeouts"),
+               look_at("ppmc.0.bad-data"));
     tell_sim("faults 1000 timeout zeros ones residue");
-    turn_all(20);
+    turn_all(0, true);
+    wait_for_cycles(2000);
+    turn_all(0, false);
     tell_sim("faults 0");
     compare_all();
     expect_pin("ppmc.0.fault", 0);
@@ -292,6 +352,7 @@ START_TEST(the_example_counts_exactly_in_linuxcnc)
 {
     const char *const argv[] = {TEST_SOURCE "/tests/system/halrun-user", "-", NULL};
     const char *skip;
+    char seconds[32];
     if (TEST_SANITIZED || access(TEST_BUILD "/linuxcnc/ppmc_epp.so", R_OK) != 0) {
         printf("SKIP: %s\n", TEST_SANITIZED ? "a component built with a sanitizer cannot be loaded into LinuxCNC"
                                             : "LinuxCNC's headers are not installed (linuxcnc-uspace-dev)");
@@ -300,6 +361,8 @@ START_TEST(the_example_counts_exactly_in_linuxcnc)
     start_sim("board 4");
     ck_assert_int_eq(setenv("PPMC", path, 1), 0);
     ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
+    snprintf(seconds, sizeof seconds, "%lu", 100 + wanted_cycles() / 1000);
+    ck_assert_int_eq(setenv("PEER_SECONDS", seconds, 1), 0);
     process_start_listening(&host, argv);
     say_example();
     if (process_wait_line(&host, "SKIP: ", 2000, &skip)) {
@@ -384,7 +447,7 @@ int main(void)
 {
     Suite *const suite = suite_create("PPMC");
     TCase *const tests = tcase_create("programs");
-    tcase_set_timeout(tests, 120);
+    tcase_set_timeout(tests, 120 + (double)wanted_cycles() / 1000);
     tcase_add_test(tests, the_tool_says_what_is_there_and_what_is_wrong);
     tcase_add_test(tests, watching_shows_live_counts_and_leaves_the_counters);
     tcase_add_test(tests, a_bus_that_is_not_there_is_told);
