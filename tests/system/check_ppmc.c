@@ -7,6 +7,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <signal.h>
+#include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,6 +16,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "simulator.h"
 
 #define READY_MS   20000
 #define END_MS     20000
@@ -377,6 +379,97 @@ START_TEST(the_example_counts_exactly_in_linuxcnc)
 }
 END_TEST
 
+/* ---- boards whose shafts turn with the step generators of a card ---------------------------------------------------
+ */
+
+#define STEPGENS 5u
+
+static void say(const char *const format, ...)
+{
+    char line[160];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(line, sizeof line, format, args);
+    va_end(args);
+    process_say(&host, line);
+}
+
+static void say_steps(const char *const address)
+{
+    say("loadrt hm2_lbp16 board_ip=%s config=num_stepgens=5\n", address);
+    say("loadrt ppmc_epp bus=sim:%s enc_clock=0xA00,0xA02 expect=0x00,0x02\n", path);
+    say("loadrt threads name1=servo period1=1000000\n");
+    say("addf hm2_7i96s.0.read servo\naddf ppmc.0.read servo\n");
+    say("addf hm2_7i96s.0.write servo\naddf ppmc.0.write servo\n");
+    say("setp hm2_7i96s.0.packet-read-timeout 100000000\nsetp hm2_7i96s.0.watchdog.timeout_ns 4000000000\n");
+    for (unsigned i = 0; i < STEPGENS; i++) {
+        say("setp hm2_7i96s.0.stepgen.%02u.steplen 1000\nsetp hm2_7i96s.0.stepgen.%02u.stepspace 1000\n", i, i);
+        say("setp hm2_7i96s.0.stepgen.%02u.maxaccel 0\nsetp hm2_7i96s.0.stepgen.%02u.maxvel 0\n", i, i);
+        say("setp hm2_7i96s.0.stepgen.%02u.control-type 1\nsetp hm2_7i96s.0.stepgen.%02u.enable 1\n", i, i);
+    }
+    say("start\n");
+}
+
+static double pin_of(const char *const format, const unsigned number)
+{
+    char pin[64];
+    snprintf(pin, sizeof pin, format, number);
+    return look_at(pin);
+}
+
+/* At rest, which is soon, the encoders have counted the steps that the card says it has made. */
+static void compare_steps(void)
+{
+    for (unsigned i = 0; i < STEPGENS; i++) {
+        double steps = 0, count = 1;
+        for (unsigned looks = 0; looks < LOOKS && count != steps; looks++) {
+            usleep(LOOK_US);
+            steps = pin_of("hm2_7i96s.0.stepgen.%02u.counts", i);
+            count = pin_of("ppmc.0.encoder.%02u.count", i);
+        }
+        if (count != steps)
+            ck_abort_msg("stepgen %u made %g steps, the encoder counted %g", i, steps, count);
+    }
+}
+
+START_TEST(encoders_count_the_steps_of_a_simulated_card)
+{
+    static const double speeds[][STEPGENS] = {{400000, -123456, 1000, -33.5, 77777}, {-250000, 499000, -999, 0, 1}};
+    static struct simulator card;
+    const char *const argv[] = {process_built("hm2host"), NULL};
+    snprintf(path, sizeof path, "/tmp/check-ppmc-%d", (int)getpid());
+    simulator_start(&card, (const char *const[]){"--ppmc", path, NULL});
+    process_start_listening(&host, argv);
+    say_steps(card.address[0]);
+    for (unsigned n = 0; n < 2; n++) {
+        const double before = pin_of("ppmc.0.encoder.%02u.count", 1);
+        for (unsigned i = 0; i < STEPGENS; i++)
+            say("setp hm2_7i96s.0.stepgen.%02u.velocity-cmd %.1f\n", i, speeds[n][i]);
+        for (unsigned i = 0; i < LOOKS && fabs(pin_of("ppmc.0.encoder.%02u.count", 1) - before) < 100000; i++)
+            usleep(LOOK_US);
+        for (unsigned i = 0; i < STEPGENS; i++)
+            say("setp hm2_7i96s.0.stepgen.%02u.velocity-cmd 0\n", i);
+        compare_steps();
+        ck_assert(fabs(pin_of("ppmc.0.encoder.%02u.count", 1) - before) >= 100000);
+    }
+    process_hush(&host);
+    ck_assert_msg(process_wait_end(&host, END_MS) && host.status == 0, "hm2host: %s", host.text);
+    simulator_stop(&card);
+    for (unsigned i = 0; i < STEPGENS; i++) {
+        long long counted, edges, illegal;
+        char start[64];
+        const char *line;
+        snprintf(start, sizeof start, "7i96s@%s:27181: ppmc %u.%u counted ", card.address[0], i / 4 * 2, i % 4);
+        ck_assert_msg(process_wait_line(&card.process, start, 0, &line), "no %s in %s", start, card.process.text);
+        ck_assert_int_eq(sscanf(line + strlen(start), "%lld of %lld edges, illegal %lld", &counted, &edges, &illegal),
+                         3);
+        ck_assert_int_eq(counted, edges);
+        ck_assert_int_eq(illegal, 0);
+    }
+    ck_assert_int_ne(access(path, F_OK), 0);
+}
+END_TEST
+
 /* ---- the cyclic path -----------------------------------------------------------------------------------------------
  */
 
@@ -456,6 +549,10 @@ int main(void)
     tcase_add_test(tests, the_cycle_calls_nothing_that_allocates_locks_or_formats);
     tcase_add_test(tests, the_servo_thread_makes_no_system_call_but_those_of_the_bus_and_its_sleep);
     suite_add_tcase(suite, tests);
+    TCase *const steps = tcase_create("steps");
+    tcase_set_timeout(steps, 120);
+    tcase_add_test(steps, encoders_count_the_steps_of_a_simulated_card);
+    suite_add_tcase(suite, steps);
     SRunner *const runner = srunner_create(suite);
     srunner_run_all(runner, CK_ENV);
     const int failed = srunner_ntests_failed(runner);
