@@ -212,7 +212,8 @@ static struct ppmc_time time_of(const struct ppmc_board *const board, const unsi
     const uint8_t *const at = board->stamps + 2 * axis;
     const bool same = !board->verify || memcmp(at, board->stamps_again + 2 * axis, 2) == 0;
     const uint16_t age_us = (uint16_t)(board->timebase - hm2_get_le16(at));
-    struct ppmc_time time = {.period_s = (double)period_ns * 1e-9, .clock_us = -1};
+    const double periods = (double)board->bad_periods + 1.0; /* in which it moved as far as it did */
+    struct ppmc_time time = {.period_s = (double)period_ns * 1e-9 * periods, .clock_us = -1};
     if (!board->timestamps || !board->clock_known)
         return time;
     time.stamped = same;
