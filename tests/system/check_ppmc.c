@@ -258,15 +258,43 @@ static void wait_for_cycles(const unsigned long count)
     }
 }
 
+/* A machine that stands still for a second while encoders turn at the filter's limit, or whose clock jumps, lets a
+ * counter of 24 bits go round. The component says so; from then on its counts are right but for whole rounds. */
+static bool went_round;
+
+static void look_for_rounds(void)
+{
+    if (look_at("ppmc.0.board.02.position-lost") == 0 && look_at("ppmc.0.board.04.position-lost") == 0)
+        return;
+    went_round = true;
+    printf("this machine stood still for so long that counters may have gone round\n");
+    process_say(&host, "setp ppmc.0.board.02.position-lost 0\nsetp ppmc.0.board.04.position-lost 0\n");
+}
+
+static void expect_count(const unsigned encoder, const int64_t wanted)
+{
+    char pin[64];
+    int32_t off = 1;
+    snprintf(pin, sizeof pin, "ppmc.0.encoder.%02u.count", encoder);
+    for (unsigned i = 0; i < LOOKS && off != 0; i++) {
+        if (i > 0)
+            usleep(LOOK_US);
+        off = (int32_t)((uint32_t)(int64_t)look_at(pin) - (uint32_t)wanted);
+        if (went_round)
+            off &= 0xFFFFFF;
+    }
+    if (off == 0)
+        return;
+    printf("%s\n", host.text);
+    ck_abort_msg("%s is %d away from %" PRId64, pin, off, wanted);
+}
+
 static void compare_all(void)
 {
     static const char *const axes[] = {"2.0", "2.1", "2.2", "2.3", "4.0", "4.1", "4.2"};
-    char pin[64];
-    for (unsigned i = 0; i < 7; i++) {
-        snprintf(pin, sizeof pin, "ppmc.0.encoder.%02u.count", i);
-        expect_pin(pin, (int32_t)truth(axes[i], "counted"));
-    }
-    expect_pin("ppmc.0.encoder.07.count", (int32_t)(truth("4.3", "counted") - truth("4.3", "preset-at")));
+    for (unsigned i = 0; i < 7; i++)
+        expect_count(i, truth(axes[i], "counted"));
+    expect_count(7, truth("4.3", "counted") - truth("4.3", "preset-at"));
 }
 
 /* Edges a second of encoders 0 to 6 in each part of a run, up to the limit of the filter; encoder 7 meets its index a
@@ -305,6 +333,7 @@ static void run_phase(const unsigned phase, const unsigned long cycles)
     expect_pin("ppmc.0.encoder.07.index-enable", 0);
     turn_all(phase, false);
     ck_assert_int_gt(truth("4.3", "presets"), presets);
+    look_for_rounds();
     compare_all();
 }
 
@@ -315,17 +344,19 @@ static void run_example(void)
     const unsigned long start = cycles_so_far();
     for (unsigned i = 0; i < PHASES; i++)
         run_phase(i, wanted_cycles() / PHASES);
-    expect_near("ppmc.0.encoder.00.position", (double)truth("2.0", "counted") / 1000,
-                fabs((double)truth("2.0", "counted")) * 1e-8); /* of six digits */
+    if (!went_round)
+        expect_near("ppmc.0.encoder.00.position", (double)truth("2.0", "counted") / 1000,
+                    fabs((double)truth("2.0", "counted")) * 1e-8); /* of six digits */
     if (wanted_cycles() > SHORT_RUN)
-        printf("%lu cycles, counted %" PRId64 " to %" PRId64 ", no difference; timeouts %g, bad data %g\n",
-               cycles_so_far() - start, truth("2.1", "counted"), truth("2.0", "counted"), look_at("ppmc.0.timeouts"),
-               look_at("ppmc.0.bad-data"));
+        printf("%lu cycles, encoder 0 at %" PRId64 ", no difference%s; timeouts %g, bad data %g\n",
+               cycles_so_far() - start, truth("2.0", "counted"), went_round ? " but whole rounds" : "",
+               look_at("ppmc.0.timeouts"), look_at("ppmc.0.bad-data"));
     tell_sim("faults 1000 timeout zeros ones residue");
     turn_all(0, true);
     wait_for_cycles(2000);
     turn_all(0, false);
     tell_sim("faults 0");
+    look_for_rounds();
     compare_all();
     expect_pin("ppmc.0.fault", 0);
     ck_assert(look_at("ppmc.0.timeouts") > 0 && look_at("ppmc.0.bad-data") > 0);

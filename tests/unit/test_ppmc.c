@@ -581,6 +581,36 @@ static void a_board_that_lost_its_power_is_set_up_again_and_its_position_does_no
     rig_free(&rig);
 }
 
+/* A counter of 24 bits: at the filter's limit it goes half its way round in 0.84 s. */
+static void a_move_while_nobody_looked_for_too_long_is_not_trusted(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t gap_ns;
+        int32_t rate;
+        bool lost;
+    } rows[] = {{800000000, 9000000, false},
+                {850000000, 9900000, true},
+                {INT64_C(20000000000), 1, true},
+                {INT64_C(20000000000), 0, false}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct rig rig;
+        rig_two(&rig, NULL);
+        rig_start(&rig);
+        rig.next_ns += INT64_C(60000000000); /* before the first reading there is nothing to lose */
+        turn(&rig, 4, 0);
+        cycles(&rig, 5);
+        turn(&rig, 4, rows[i].rate);
+        rig.next_ns += rows[i].gap_ns;
+        cycles(&rig, 2);
+        if ((get(&rig, "board.04.position-lost") != 0) != rows[i].lost || get(&rig, "board.02.position-lost") != 0)
+            fail_msg("row %zu: position-lost is %.0f", i, get(&rig, "board.04.position-lost"));
+        if (!rows[i].lost)
+            assert_true(get(&rig, "encoder.04.count") == (double)held(&rig, 4));
+        rig_free(&rig);
+    }
+}
+
 static void a_reset_in_mid_run_is_noticed(void **state)
 {
     (void)state;
@@ -841,6 +871,7 @@ int main(void)
         cmocka_unit_test(after_a_period_without_data_the_velocity_is_that_of_two),
         cmocka_unit_test(a_pulled_cable_holds_all_values_and_comes_back),
         cmocka_unit_test(a_board_that_lost_its_power_is_set_up_again_and_its_position_does_not_move),
+        cmocka_unit_test(a_move_while_nobody_looked_for_too_long_is_not_trusted),
         cmocka_unit_test(a_reset_in_mid_run_is_noticed),
         cmocka_unit_test(another_board_in_the_slot_is_not_read),
         cmocka_unit_test(the_index_presets_exactly_at_every_speed),
