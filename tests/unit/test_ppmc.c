@@ -290,25 +290,35 @@ static const struct {
     {"the longest way down", 0, 0x800001, -8388607},
 };
 
-static void readings_are_extended_by_their_modular_difference(void **state)
+static void reading_is_extended(const size_t row, const unsigned axis)
+{
+    struct watch watch;
+    struct rig rig;
+    rig_two(&rig, NULL);
+    rig_start(&rig);
+    watch_all(&watch, &rig, 4);
+    for (unsigned i = 0; i < 4; i++) /* the others stay away from 0 */
+        sim_ppmc_set_counter(rig.bus, 2, i, i == axis ? readings[row].before : 1000000);
+    cycle(&rig);
+    const int32_t before = *watch.count[axis];
+    sim_ppmc_set_counter(rig.bus, 2, axis, readings[row].after);
+    rig.next_ns += INT64_C(1000000000); /* time for the way */
+    cycle(&rig);
+    for (unsigned i = 0; i < 4; i++) {
+        const int32_t wanted = i == axis ? readings[row].delta : 0;
+        if (*watch.delta[i] != wanted || (i == axis && *watch.count[i] - before != wanted))
+            fail_msg("%s on axis %u: delta of axis %u is %d, wanted %d", readings[row].name, axis, i, *watch.delta[i],
+                     wanted);
+    }
+    rig_free(&rig);
+}
+
+static void readings_of_each_axis_are_extended_by_their_modular_difference(void **state)
 {
     (void)state;
-    for (size_t i = 0; i < sizeof readings / sizeof readings[0]; i++) {
-        struct rig rig;
-        rig_two(&rig, NULL);
-        rig_start(&rig);
-        for (unsigned axis = 0; axis < 4; axis++) /* the others stay away from 0 */
-            sim_ppmc_set_counter(rig.bus, 2, axis, axis == 1 ? readings[i].before : 1000000);
-        cycle(&rig);
-        const double before = get(&rig, "encoder.01.count");
-        sim_ppmc_set_counter(rig.bus, 2, 1, readings[i].after);
-        rig.next_ns += INT64_C(1000000000); /* time for the way */
-        cycle(&rig);
-        if (get(&rig, "encoder.01.count") - before != readings[i].delta ||
-            get(&rig, "encoder.01.delta") != readings[i].delta)
-            fail_msg("%s: delta %.0f, wanted %d", readings[i].name, get(&rig, "encoder.01.delta"), readings[i].delta);
-        rig_free(&rig);
-    }
+    for (size_t row = 0; row < sizeof readings / sizeof readings[0]; row++)
+        for (unsigned axis = 0; axis < 4; axis++)
+            reading_is_extended(row, axis);
 }
 
 static void position_goes_on_where_count_wraps(void **state)
@@ -836,6 +846,83 @@ static void one_period_takes_the_documented_cycles(void **state)
     }
 }
 
+/* A bus that writes down what it is told: address A20, written bytes W00, read ones as R16. */
+struct recorder {
+    struct epp base, *bus;
+    char text[4096];
+};
+
+static void record(struct recorder *const recorder, const struct epp_step *const step)
+{
+    const bool address = step->kind == EPP_ADDRESS_WRITE;
+    for (unsigned i = 0; i < step->len; i++) {
+        const size_t used = strlen(recorder->text), left = sizeof recorder->text - used;
+        if (step->kind == EPP_DATA_READ) {
+            (void)snprintf(recorder->text + used, left, " R%u", step->len);
+            return;
+        }
+        (void)snprintf(recorder->text + used, left, " %c%02X", address ? 'A' : 'W', step->data[i]);
+    }
+}
+
+static int recorder_run(struct epp *const epp, const struct epp_step *const steps, const size_t count,
+                        struct epp_done *const done)
+{
+    struct recorder *const recorder = (struct recorder *)epp;
+    const int err = epp_run(recorder->bus, steps, count, done);
+    for (size_t i = 0; i < done->steps; i++)
+        record(recorder, &steps[i]);
+    return err;
+}
+
+static int64_t recorder_now(struct epp *const epp)
+{
+    return epp_now_ns(((struct recorder *)epp)->bus);
+}
+
+static void recorder_close(struct epp *const epp)
+{
+    epp_close(((struct recorder *)epp)->bus);
+}
+
+static void expect_recorded(struct recorder *const recorder, const char *const what, const char *const wanted)
+{
+    /* From where the first register was written on; before that it has looked for boards. */
+    const char *const found = strstr(recorder->text, wanted);
+    if (!found || found[strlen(wanted)] != '\0')
+        fail_msg("%s: wanted%s, found%s", what, wanted, recorder->text);
+    recorder->text[0] = '\0';
+}
+
+/* Every register that is written (seed 004), in set-up and in a period: control 3, timer 4, assembly 0 to 2, index
+ * preset 13, filter rate 5. The first board of the bus is the master and gives the latch pulse. */
+static void set_up_and_a_period_write_the_registers_that_the_board_has_for_it(void **state)
+{
+    (void)state;
+    static const struct epp_ops ops = {.run = recorder_run, .now_ns = recorder_now, .close = recorder_close};
+    static struct recorder recorder;
+    struct hm2_diag diag = {0};
+    struct rig rig;
+    rig_two(&rig, NULL);
+    rig.options.timestamps = 1u << 4;
+    rig.options.filter[4] = PPMC_FILTER_KEEP;
+    recorder = (struct recorder){.base.ops = &ops, .bus = sim_ppmc_epp(rig.bus)};
+    assert_int_equal(ppmc_setup(rig.ppmc, &recorder.base, hm2_plain_binder(rig.plain), &rig.options, &diag), 0);
+    rig.next_ns = sim_ppmc_now_ns(rig.bus) + PERIOD_NS;
+    expect_recorded(&recorder, "set-up",
+                    " A23 W00 A24 W10 A23 WF0 A20 W00 A21 W00 A22 W00 A23 WF0 A23 WF0 A23 W00 A2D W00 A25 W03"
+                    " A43 W00 A44 W00 A43 WF0 A40 W00 A41 W00 A42 W00 A43 WF0 A43 WF0 A43 W00 A4D W00");
+    cycle(&rig);
+    expect_recorded(&recorder, "a period",
+                    " A24 W20 A24 W20 A24 W00 A20 R16 A20 R12 A40 R16 A40 R12 A50 R10 A50 R10 A2D W00 A4D W00");
+    set(&rig, "encoder.05.index-enable", 1);
+    cycle(&rig);
+    expect_recorded(&recorder, "arming", " A2D W00 A4C R1 A4D W02");
+    ppmc_stop(rig.ppmc);
+    expect_recorded(&recorder, "the end", " A2D W00 A4D W00");
+    rig_free(&rig);
+}
+
 static void sixteen_boards_fit(void **state)
 {
     (void)state;
@@ -860,7 +947,7 @@ int main(void)
         cmocka_unit_test(version_15_is_an_empty_slot_and_an_empty_bus_is_an_error),
         cmocka_unit_test(options_that_a_board_cannot_do_are_errors),
         cmocka_unit_test(the_filter_rate_is_written_by_its_code),
-        cmocka_unit_test(readings_are_extended_by_their_modular_difference),
+        cmocka_unit_test(readings_of_each_axis_are_extended_by_their_modular_difference),
         cmocka_unit_test(position_goes_on_where_count_wraps),
         cmocka_unit_test(a_million_cycles_at_all_rates_miss_no_count),
         cmocka_unit_test(timeouts_in_one_of_a_thousand_cycles_show_no_wrong_count),
@@ -882,6 +969,7 @@ int main(void)
         cmocka_unit_test(dithering_on_an_edge_is_no_motion),
         cmocka_unit_test(a_scale_that_is_none_becomes_one_before_it_is_used),
         cmocka_unit_test(one_period_takes_the_documented_cycles),
+        cmocka_unit_test(set_up_and_a_period_write_the_registers_that_the_board_has_for_it),
         cmocka_unit_test(sixteen_boards_fit),
     };
     return cmocka_run_group_tests_name("PPMC", tests, NULL, NULL);
