@@ -212,7 +212,8 @@ static struct ppmc_time time_of(const struct ppmc_board *const board, const unsi
     const uint8_t *const at = board->stamps + 2 * axis;
     const bool same = !board->verify || memcmp(at, board->stamps_again + 2 * axis, 2) == 0;
     const uint16_t age_us = (uint16_t)(board->timebase - hm2_get_le16(at));
-    struct ppmc_time time = {.period_s = (double)period_ns * 1e-9, .clock_us = -1};
+    const double periods = (double)board->bad_periods + 1.0; /* in which it moved as far as it did */
+    struct ppmc_time time = {.period_s = (double)period_ns * 1e-9 * periods, .clock_us = -1};
     if (!board->timestamps || !board->clock_known)
         return time;
     time.stamped = same;
@@ -268,6 +269,17 @@ static bool settle(struct ppmc *const ppmc, struct ppmc_board *const board, cons
     return true;
 }
 
+/* 24 bits tell how far it moved only as long as it cannot have gone half their way round. One that shows no move has
+ * made none: it would have to be back at the very count. */
+static bool may_have_gone_round(const struct ppmc_board *const board, const struct ppmc_judgement *const judgements,
+                                const int64_t most)
+{
+    bool moved = false;
+    for (unsigned i = 0; i < PPMC_AXES; i++)
+        moved = moved || (board->encoders[i].known && !judgements[i].index && judgements[i].moved != 0);
+    return moved && most >= PPMC_HALF_ROUND;
+}
+
 /* True when this period's data of the board is good. */
 static bool read_board(struct ppmc *const ppmc, struct ppmc_board *const board, const int64_t before_ns,
                        const long period_ns)
@@ -278,11 +290,14 @@ static bool read_board(struct ppmc *const ppmc, struct ppmc_board *const board, 
         return false;
     }
     const int64_t gap_ns = before_ns - board->good_ns;
-    const bool possible = is_possible(board, judgements, most_counts(board, epp_now_ns(ppmc->epp), period_ns));
+    const int64_t most = most_counts(board, epp_now_ns(ppmc->epp), period_ns);
+    const bool possible = is_possible(board, judgements, most);
     board->jumps = possible ? 0 : board->jumps + 1;
     ppmc->bad_data += !possible;
     if ((!possible && board->jumps < JUMP_PERIODS) || !settle(ppmc, board, !possible, gap_ns))
         return false;
+    if (possible && may_have_gone_round(board, judgements, most))
+        lose_position(board);
     if (possible)
         take(board, judgements, gap_ns, period_ns);
     else

@@ -11,7 +11,7 @@ static const struct {
     {"gives no usable data: its outputs keep their values; check power and cable (pins timeouts, io-errors, bad-data)",
      true},
     {"is back, its settings were written again", false},
-    {"its counters may have been reset: home its axes, then set position-lost to 0", true},
+    {"its counters may have been reset, or gone round unseen: home its axes, then set position-lost to 0", true},
 };
 
 static bool is_new(_Atomic uint32_t *const happened, uint32_t *const told)

@@ -118,7 +118,7 @@ void ppmc_count_error(struct ppmc *ppmc, int err);
 /* `most` is how far it can have moved; `sense` whether its index was seen. */
 struct ppmc_judgement ppmc_judge(const struct ppmc_encoder *encoder, const uint8_t *bytes, bool sense, int64_t most);
 struct ppmc_time {
-    double period_s;
+    double period_s;  /* since the last good latch pulse, by the thread's period */
     bool stamped;     /* the board's clock and this axis' timestamp can be used */
     int64_t clock_us; /* at the latch pulse */
     int64_t count_us; /* at its last count */

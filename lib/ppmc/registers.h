@@ -10,6 +10,7 @@
 #define PPMC_R_ID         15u
 #define PPMC_R_TIMESTAMPS 16u /* 16 bits an axis, then the counter that they are taken from */
 #define PPMC_COUNT_BYTES  3u
+#define PPMC_HALF_ROUND   0x800000 /* counts, of 24 bits */
 #define PPMC_COUNTS_BYTES 12u
 #define PPMC_BLOCK_BYTES  16u /* counts, index sense, two unused, ID */
 #define PPMC_STAMPS_BYTES 10u

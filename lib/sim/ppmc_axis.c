@@ -123,30 +123,62 @@ static void one_edge(struct ppmc_axis *const axis, const struct ppmc_axis_settin
     axis->changed_ns = at_ns;
 }
 
-/* When the n-th edge from now comes, n from 1. */
-static int64_t edge_ns(const struct ppmc_axis *const axis, const int64_t n)
+/* When an edge comes, in whole nanoseconds, and by how many parts of 1/num that is late. */
+struct moment {
+    int64_t ns, late;
+};
+
+/* The n-th edge from now, n from 1. */
+static struct moment moment_of(const struct ppmc_axis *const axis, const int64_t n)
 {
-    return axis->now_ns + (n * axis->den - axis->phase + axis->num - 1) / axis->num;
+    const int64_t parts = n * axis->den - axis->phase, ns = (parts + axis->num - 1) / axis->num;
+    return (struct moment){axis->now_ns + ns, ns * axis->num - parts};
 }
 
-/* So many evenly spaced edges. When their distance is the filter's time or more, each but the last is a count, and the
- * last waits to be one; when it is less, none of them but the last can ever be. */
+/* The edge behind one, and the one before it, without a division. */
+static struct moment later(const struct ppmc_axis *const axis, const struct moment edge)
+{
+    const struct moment next = {edge.ns + axis->gap_ns, edge.late - axis->gap_rest};
+    return next.late < 0 ? (struct moment){next.ns + 1, next.late + axis->num} : next;
+}
+
+static struct moment earlier(const struct ppmc_axis *const axis, const struct moment edge)
+{
+    const struct moment last = {edge.ns - axis->gap_ns, edge.late + axis->gap_rest};
+    return last.late >= axis->num ? (struct moment){last.ns - 1, last.late - axis->num} : last;
+}
+
+/* So many evenly spaced edges, at least one. When their distance is the filter's time or more, each but the last is a
+ * count, and the last waits to be one; when it is less, none of them but the last can ever be. */
 static void edges(struct ppmc_axis *const axis, const struct ppmc_axis_setting *const setting, const int64_t n)
 {
     const bool slow = axis->num * setting->filter_ns <= axis->den;
+    struct moment edge = moment_of(axis, 1);
     int64_t done = 0;
-    while (done < n && (axis->broken || done < 2))
-        one_edge(axis, setting, axis->direction, edge_ns(axis, ++done));
+    for (; done < n && (axis->broken || done < 2); done++) {
+        one_edge(axis, setting, axis->direction, edge.ns);
+        edge = later(axis, edge);
+    }
     if (done == n)
         return;
     /* Two edges ago the filter saw an ordinary state; from here on all is alike. */
+    const struct moment last = moment_of(axis, n);
     if (slow) {
-        settle(axis, setting, edge_ns(axis, done + 1));
-        count(axis, setting, axis->direction, n - done - 1, edge_ns(axis, n - 1) + setting->filter_ns);
+        settle(axis, setting, edge.ns);
+        count(axis, setting, axis->direction, n - done - 1, earlier(axis, last).ns + setting->filter_ns);
     }
     axis->shaft += axis->direction * (n - done);
     axis->input = seen(axis, axis->shaft);
-    axis->changed_ns = edge_ns(axis, n);
+    axis->changed_ns = last.ns;
+}
+
+/* Edges come `num` times in `den` nanoseconds. */
+static void set_pace(struct ppmc_axis *const axis, const int64_t num, const int64_t den)
+{
+    axis->num = num;
+    axis->den = den;
+    axis->gap_ns = num > 0 ? den / num : 0;
+    axis->gap_rest = num > 0 ? den % num : 0;
 }
 
 /* ---- time -------------------------------------------------------------------------------------------------------- */
@@ -158,8 +190,7 @@ static void aim(struct ppmc_axis *const axis, const int64_t to_ns)
     const int64_t most = (to_ns - axis->now_ns) / 10; /* as for a steady rate: 1e8 a second */
     const int64_t edges_now = way < 0 ? -way : way;
     axis->direction = way < 0 ? -1 : 1;
-    axis->num = edges_now < most ? edges_now : most;
-    axis->den = to_ns - axis->now_ns;
+    set_pace(axis, edges_now < most ? edges_now : most, to_ns - axis->now_ns);
     axis->phase = 0;
 }
 
@@ -169,8 +200,10 @@ static void stretch(struct ppmc_axis *const axis, const struct ppmc_axis_setting
         aim(axis, to_ns);
     if (axis->num > 0) {
         const int64_t phase = axis->phase + axis->num * (to_ns - axis->now_ns);
-        edges(axis, setting, phase / axis->den);
-        axis->phase = phase % axis->den;
+        const int64_t passed = phase < axis->den ? 0 : phase / axis->den;
+        if (passed > 0)
+            edges(axis, setting, passed);
+        axis->phase = phase - passed * axis->den;
     }
     axis->now_ns = to_ns;
     settle(axis, setting, to_ns);
@@ -194,8 +227,7 @@ void ppmc_axis_set_rate(struct ppmc_axis *const axis, const int32_t edges_per_s)
     else if (direction != axis->direction)
         axis->phase = axis->phase == 0 ? 0 : NS_PER_S - axis->phase;
     axis->position = NULL;
-    axis->den = NS_PER_S;
-    axis->num = rate < MAX_EDGES_PER_S ? rate : MAX_EDGES_PER_S;
+    set_pace(axis, rate < MAX_EDGES_PER_S ? rate : MAX_EDGES_PER_S, NS_PER_S);
     axis->direction = direction;
 }
 

@@ -24,6 +24,7 @@ struct ppmc_axis {
     /* The shaft: an edge whenever `phase`, which grows by `num` a nanosecond, passes `den`. */
     int64_t now_ns;
     int64_t shaft, num, den, phase;
+    int64_t gap_ns, gap_rest; /* from edge to edge: den / num and its remainder */
     int direction;
     sim_ppmc_position_fn position;
     void *context;

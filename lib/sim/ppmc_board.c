@@ -21,6 +21,7 @@ enum {
     WRITE_INDEX_PRESET = 13,
 };
 
+#define CONTROL_LOAD     0xF0u /* seed 004, "Control Register Bits" */
 #define TIMER_SOFT_LATCH 0x20u /* seed 004, "Timer Register Bits" */
 #define TIMER_MASTER     0x10u
 #define TIMER_RATE       0x0Fu
@@ -121,8 +122,10 @@ static void move_axes(struct ppmc_board *const board, const int64_t to_ns)
     board->now_ns = to_ns;
 }
 
-static void latch(struct ppmc_board *const board)
+void ppmc_board_latch(struct ppmc_board *const board)
 {
+    if (!board->present || !board->powered)
+        return;
     for (unsigned i = 0; i < SIM_PPMC_AXES; i++) {
         struct ppmc_axis *const axis = &board->axes[i];
         if (ppmc_board_setting(board, i).index_select)
@@ -145,14 +148,10 @@ static void load(struct ppmc_board *const board)
             board->axes[i].counter = board->registers.assembly;
 }
 
-/* Rule 11: which rates there are no document tells. */
-static void master_pulses(struct ppmc_board *const board)
+/* Does a tick of the filter clock do more than let edges pass? */
+static bool is_tick_of_use(const struct ppmc_board *const board, const bool line)
 {
-    const int64_t period_ns = board->options->master_ns[board->registers.timer & TIMER_RATE];
-    if (!(board->registers.timer & TIMER_MASTER) || period_ns <= 0 || board->now_ns < board->pulse_due_ns)
-        return;
-    board->pulse_due_ns = board->now_ns + period_ns;
-    latch(board);
+    return line != board->line_seen || (board->registers.control & CONTROL_LOAD);
 }
 
 void ppmc_board_advance(struct ppmc_board *const board, const int64_t to_ns, const bool line)
@@ -161,50 +160,73 @@ void ppmc_board_advance(struct ppmc_board *const board, const int64_t to_ns, con
     const int64_t first_tick_ns = (board->now_ns / tick_ns + 1) * tick_ns;
     if (!board->present || to_ns <= board->now_ns)
         return;
-    if (first_tick_ns <= to_ns) {
+    if (first_tick_ns <= to_ns && is_tick_of_use(board, line)) {
         move_axes(board, first_tick_ns);
         load(board);
         if (line && !board->line_seen)
-            latch(board);
+            ppmc_board_latch(board);
         board->line_seen = line;
         move_axes(board, to_ns);
         load(board);
-        master_pulses(board);
     }
     move_axes(board, to_ns);
 }
 
 /* ---- registers --------------------------------------------------------------------------------------------------- */
 
-static void write_control(struct ppmc_board *const board, const uint8_t value)
+/* All registers behind a write; false when there is none at this offset. */
+static bool written(const struct ppmc_board *const board, const unsigned offset, const uint8_t value,
+                    struct sim_ppmc_registers *const after)
 {
-    if ((board->registers.control ^ value) & 0xF0u)
-        board->load_since_ns = board->now_ns;
-    board->registers.control = value;
+    *after = board->registers;
+    if (offset < WRITE_CONTROL)
+        after->assembly = (after->assembly & ~(0xFFu << 8 * offset)) | (uint32_t)value << 8 * offset;
+    else if (offset == WRITE_CONTROL)
+        after->control = value;
+    else if (offset == WRITE_TIMER)
+        after->timer = value;
+    else if (offset == WRITE_FILTER && has_filter_register(board))
+        after->filter = value & 3u;
+    else if (offset == WRITE_INDEX_PRESET && has_preset_register(board))
+        after->preset = value & 0x0Fu;
+    else
+        return false;
+    return true;
+}
+
+bool ppmc_board_is_changed(const struct ppmc_board *const board, const unsigned offset, const uint8_t value)
+{
+    struct sim_ppmc_registers after;
+    return written(board, offset, value, &after) && memcmp(&after, &board->registers, sizeof after) != 0;
 }
 
 void ppmc_board_write(struct ppmc_board *const board, const unsigned offset, const uint8_t value)
 {
-    struct sim_ppmc_registers *const registers = &board->registers;
-    if (offset < WRITE_CONTROL)
-        registers->assembly = (registers->assembly & ~(0xFFu << 8 * offset)) | (uint32_t)value << 8 * offset;
-    else if (offset == WRITE_CONTROL)
-        write_control(board, value);
-    else if (offset == WRITE_TIMER)
-        registers->timer = value;
-    else if (offset == WRITE_FILTER && has_filter_register(board))
-        registers->filter = value & 3u;
-    else if (offset == WRITE_INDEX_PRESET && has_preset_register(board))
-        registers->preset = value & 0x0Fu;
-    else
+    struct sim_ppmc_registers after;
+    if (!written(board, offset, value, &after)) {
         board->stats->undocumented++;
+        return;
+    }
+    if ((board->registers.control ^ after.control) & CONTROL_LOAD)
+        board->load_since_ns = board->now_ns;
+    if (board->registers.timer != after.timer)
+        board->pulsed_ns = board->now_ns;
+    board->registers = after;
+}
+
+int64_t ppmc_board_pulse_ns(const struct ppmc_board *const board)
+{
+    if (!board->present || !board->powered || !(board->registers.timer & TIMER_MASTER))
+        return INT64_MAX;
+    const int64_t period_ns = board->options->master_ns[board->registers.timer & TIMER_RATE];
+    return period_ns > 0 ? board->pulsed_ns + period_ns : INT64_MAX;
 }
 
 bool ppmc_board_is_held(const struct ppmc_board *const board, const unsigned offset, const bool line)
 {
-    const bool master = board->registers.timer & TIMER_MASTER;
     const bool old = !has_preset_register(board); /* its holding registers may be latched by an index */
-    return offset < READ_INDEX_SENSE && line == board->line_seen && !master && !old;
+    const bool fixed = offset > READ_INDEX_SENSE && offset <= READ_ID;
+    return fixed || (offset < READ_INDEX_SENSE && line == board->line_seen && !old);
 }
 
 static uint8_t read_sense(struct ppmc_board *const board)

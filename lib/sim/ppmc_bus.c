@@ -22,6 +22,8 @@ struct sim_ppmc *sim_ppmc_new(const struct sim_ppmc_options *const options)
         bus->options.cycle_ns = DEFAULT_CYCLE_NS;
     if (bus->options.timeout_ns <= 0)
         bus->options.timeout_ns = DEFAULT_TIMEOUT_NS;
+    for (unsigned i = 0; i < sizeof bus->options.master_ns / sizeof bus->options.master_ns[0]; i++)
+        bus->pulses = bus->pulses || bus->options.master_ns[i] > 0;
     bus->random = bus->options.seed;
     return bus;
 }
@@ -73,8 +75,33 @@ int64_t sim_ppmc_now_ns(const struct sim_ppmc *const bus)
     return bus->now_ns;
 }
 
+static struct ppmc_board *next_master(struct sim_ppmc *const bus)
+{
+    struct ppmc_board *next = &bus->boards[0];
+    for (unsigned i = 1; i < SIM_PPMC_SLOTS; i++)
+        if (ppmc_board_pulse_ns(&bus->boards[i]) < ppmc_board_pulse_ns(next))
+            next = &bus->boards[i];
+    return next;
+}
+
+/* The pulses that masters have given by now; they reach all boards (rule 11). */
+static void give_pulses(struct sim_ppmc *const bus)
+{
+    struct ppmc_board *master;
+    while (master = next_master(bus), ppmc_board_pulse_ns(master) <= bus->now_ns) {
+        const int64_t at_ns = ppmc_board_pulse_ns(master);
+        for (unsigned i = 0; i < SIM_PPMC_SLOTS; i++) {
+            ppmc_board_advance(&bus->boards[i], at_ns, bus->line);
+            ppmc_board_latch(&bus->boards[i]);
+        }
+        master->pulsed_ns = at_ns;
+    }
+}
+
 static void bring_up_to_date(struct sim_ppmc *const bus, struct ppmc_board *const board)
 {
+    if (bus->pulses)
+        give_pulses(bus);
     ppmc_board_advance(board, bus->now_ns, bus->line);
 }
 
@@ -128,12 +155,10 @@ static bool nobody_answers(struct sim_ppmc *const bus, const bool reads, uint8_t
 /* The address counter of the board that is selected (rule 17). */
 static void count_address(struct sim_ppmc *const bus, const struct ppmc_board *const board)
 {
-    const unsigned size = board->slots * REGISTERS_OF_SLOT, base = board->slot * REGISTERS_OF_SLOT;
-    if (!bus->options.runs_on)
-        bus->address = (uint8_t)(base + (bus->address - base + 1u) % size);
-    else
-        bus->address++;
-    if ((bus->address - base) % size == 0)
+    const unsigned last = board->slots * REGISTERS_OF_SLOT - 1, base = board->slot * REGISTERS_OF_SLOT;
+    const bool ends = bus->address - base == last;
+    bus->address = (uint8_t)(ends && !bus->options.runs_on ? base : bus->address + 1u);
+    if (ends)
         bus->stats.undocumented++;
 }
 
@@ -155,12 +180,14 @@ static bool data_cycle(struct sim_ppmc *const bus, const bool reads, const enum 
     struct ppmc_board *const board = selected(bus);
     if (!board)
         return nobody_answers(bus, reads, byte);
-    if (!reads || !ppmc_board_is_held(board, bus->address - board->slot * REGISTERS_OF_SLOT, bus->line))
+    const unsigned offset = bus->address - board->slot * REGISTERS_OF_SLOT;
+    const bool timeless = reads ? ppmc_board_is_held(board, offset, bus->line) && !bus->pulses
+                                : !ppmc_board_is_changed(board, offset, *byte);
+    if (!timeless)
         bring_up_to_date(bus, board);
     if (reads) {
         read_byte(bus, board, fault, byte);
     } else {
-        const unsigned offset = bus->address - board->slot * REGISTERS_OF_SLOT;
         const uint8_t timer = board->registers.timer;
         ppmc_board_write(board, offset, *byte);
         if (timer != board->registers.timer)

@@ -20,7 +20,8 @@ struct sim_ppmc {
     struct ppmc_board *at[SIM_PPMC_SLOTS];    /* that answers at each slot, or NULL */
     bool powered;                             /* at least one */
     uint8_t address, residue;
-    bool line; /* of the latch pulse, which all boards share (ppmc.md section 2.4) */
+    bool pulses; /* masters give latch pulses by themselves */
+    bool line;   /* of the latch pulse, which all boards share (ppmc.md section 2.4) */
     bool unplugged;
     /* The port in front (ppmc.md section 3.3). */
     bool timeout;

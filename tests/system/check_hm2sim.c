@@ -255,6 +255,7 @@ START_TEST(what_the_card_does_not_have_is_refused)
         {"--remote", "0:0=7i77", "no smart-serial port 0 channel 1"},
         {"--remote", "1:0=7i76", "no smart-serial port 1 channel 0"},
         {"--servo", "0:0:0:SpinOut:100", "no remote with such a numeric output"},
+        {"--ppmc", "/nonexistent/socket", "No such file"},
         {"--firmware", "/nonexistent.hex", "/nonexistent.hex"},
         {"--bind", "192.0.2.1", "cannot listen"},
         {"--control", "/nonexistent/socket", "control socket"},

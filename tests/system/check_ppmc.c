@@ -7,6 +7,8 @@
 #include <inttypes.h>
 #include <math.h>
 #include <signal.h>
+#include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,6 +16,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "simulator.h"
 
 #define READY_MS   20000
 #define END_MS     20000
@@ -161,13 +164,28 @@ END_TEST
 /* ---- the example in a host -----------------------------------------------------------------------------------------
  */
 
+/* How many cycles of the boards at all rates are wanted, and from how many on the servo thread runs faster than the
+ * example's. PPMC_CYCLES=1000000 takes four minutes in each host. */
+#define SHORT_RUN 4000ul
+
+static unsigned long wanted_cycles(void)
+{
+    const char *const asked = getenv("PPMC_CYCLES");
+    const unsigned long cycles = asked ? strtoul(asked, NULL, 10) : 0;
+    return cycles > SHORT_RUN ? cycles : SHORT_RUN;
+}
+
 /* All of the example up to its start, as commands of standard input. */
 static void say_example(void)
 {
+    static const char period[] = "period1=1000000", fast[] = "period1=200000";
     char line[256];
     FILE *const file = fopen(TEST_SOURCE "/examples/ppmc-encoders.hal", "r");
     ck_assert_ptr_nonnull(file);
     while (fgets(line, sizeof line, file)) {
+        char *const at = strstr(line, period);
+        if (at && wanted_cycles() > SHORT_RUN)
+            snprintf(at, sizeof line - (size_t)(at - line), "%s\n", fast);
         process_say(&host, line);
         if (strcmp(line, "start\n") == 0)
             break;
@@ -213,57 +231,132 @@ static void expect_pin(const char *const pin, const double wanted)
     expect_near(pin, wanted, 0);
 }
 
-static void wait_for_cycles(void)
+#define BOARDS 2u
+
+/* Latch pulses of both boards, one a cycle each. */
+static unsigned long cycles_so_far(void)
 {
-    unsigned long cycles = 0;
-    for (unsigned i = 0; i < LOOKS && cycles < 5000 && !host.ended; i++) {
-        (void)process_wait_line(&host, "never printed", 50, NULL);
-        (void)sscanf(ask_sim("stats"), "cycles %lu", &cycles);
+    unsigned long latches = 0;
+    (void)sscanf(ask_sim("stats"), "cycles %*u unanswered %*u latches %lu", &latches);
+    return latches / BOARDS;
+}
+
+static void wait_for_cycles(const unsigned long count)
+{
+    const unsigned long end = cycles_so_far() + count;
+    unsigned long now = 0, before = 0;
+    for (unsigned idle = 0; now < end && idle < LOOKS; idle++) {
+        usleep(count > SHORT_RUN ? 10 * LOOK_US : LOOK_US);
+        now = cycles_so_far();
+        if (now > before)
+            idle = 0;
+        before = now;
     }
-    if (cycles < 5000) {
+    if (now < end) {
         printf("%s\n", host.text);
-        ck_abort_msg("the example does not run");
+        ck_abort_msg("the example does not run: %lu cycles", now);
     }
+}
+
+/* A machine that stands still for a second while encoders turn at the filter's limit, or whose clock jumps, lets a
+ * counter of 24 bits go round. The component says so; from then on its counts are right but for whole rounds. */
+static bool went_round;
+
+static void look_for_rounds(void)
+{
+    if (look_at("ppmc.0.board.02.position-lost") == 0 && look_at("ppmc.0.board.04.position-lost") == 0)
+        return;
+    went_round = true;
+    printf("this machine stood still for so long that counters may have gone round\n");
+    process_say(&host, "setp ppmc.0.board.02.position-lost 0\nsetp ppmc.0.board.04.position-lost 0\n");
+}
+
+static void expect_count(const unsigned encoder, const int64_t wanted)
+{
+    char pin[64];
+    int32_t off = 1;
+    snprintf(pin, sizeof pin, "ppmc.0.encoder.%02u.count", encoder);
+    for (unsigned i = 0; i < LOOKS && off != 0; i++) {
+        if (i > 0)
+            usleep(LOOK_US);
+        off = (int32_t)((uint32_t)(int64_t)look_at(pin) - (uint32_t)wanted);
+        if (went_round)
+            off &= 0xFFFFFF;
+    }
+    if (off == 0)
+        return;
+    printf("%s\n", host.text);
+    ck_abort_msg("%s is %d away from %" PRId64, pin, off, wanted);
 }
 
 static void compare_all(void)
 {
     static const char *const axes[] = {"2.0", "2.1", "2.2", "2.3", "4.0", "4.1", "4.2"};
-    char pin[64];
-    for (unsigned i = 0; i < 7; i++) {
-        snprintf(pin, sizeof pin, "ppmc.0.encoder.%02u.count", i);
-        expect_pin(pin, (double)truth(axes[i], "counted"));
-    }
-    expect_pin("ppmc.0.encoder.07.count", (double)(truth("4.3", "counted") - truth("4.3", "preset-at")));
+    for (unsigned i = 0; i < 7; i++)
+        expect_count(i, truth(axes[i], "counted"));
+    expect_count(7, truth("4.3", "counted") - truth("4.3", "preset-at"));
 }
 
-static void turn_all(const unsigned tenths)
+/* Edges a second of encoders 0 to 6 in each part of a run, up to the limit of the filter; encoder 7 meets its index a
+ * few times a second. */
+static const struct {
+    int rates[7], with_index;
+} phases[] = {
+    {{9000000, -500000, 1000, -33, 123456, 0, 7}, -20000},
+    {{10000000, -10000000, 9999999, -2500000, 5000000, 1, -1}, 20000},
+    {{0, 37, -999999, 10000000, -10000000, 1000000, -12345}, -30000},
+    {{-10000000, 10000000, -10000000, 10000000, -10000000, 10000000, -10000000}, 25000},
+};
+#define PHASES (sizeof phases / sizeof phases[0])
+
+static void turn(const unsigned encoder, const int rate)
 {
-    static const char *const axes[] = {"2.0 9000000", "2.1 -500000", "2.2 1000", "2.3 -33", "4.0 123456", "4.3 -20000"};
     char command[64];
-    for (unsigned i = 0; i < 6; i++) {
-        snprintf(command, sizeof command, "rate %s", axes[i]);
-        tell_sim(command);
-    }
-    usleep(tenths * 100000);
-    for (unsigned i = 0; i < 6; i++) {
-        snprintf(command, sizeof command, "rate %.3s 0", axes[i]);
-        tell_sim(command);
-    }
+    snprintf(command, sizeof command, "rate %u.%u %d", encoder < 4 ? 2u : 4u, encoder % 4, rate);
+    tell_sim(command);
+}
+
+static void turn_all(const unsigned phase, const bool on)
+{
+    for (unsigned i = 0; i < 7; i++)
+        turn(i, on ? phases[phase].rates[i] : 0);
+    turn(7, on ? phases[phase].with_index : 0);
+}
+
+static void run_phase(const unsigned phase, const unsigned long cycles)
+{
+    const int64_t presets = truth("4.3", "presets");
+    process_say(&host, "setp ppmc.0.encoder.07.index-enable 1\n");
+    expect_pin("ppmc.0.encoder.07.index-enable", 1);
+    turn_all(phase, true);
+    wait_for_cycles(cycles);
+    expect_pin("ppmc.0.encoder.07.index-enable", 0);
+    turn_all(phase, false);
+    ck_assert_int_gt(truth("4.3", "presets"), presets);
+    look_for_rounds();
+    compare_all();
 }
 
 static void run_example(void)
 {
-    wait_for_cycles();
+    wait_for_cycles(1000);
     expect_pin("ppmc.0.encoder.07.index-enable", 1);
-    turn_all(10);
-    compare_all();
-    ck_assert_int_eq(truth("4.3", "presets"), 1);
-    expect_pin("ppmc.0.encoder.07.index-enable", 0);
-    expect_near("ppmc.0.encoder.00.position", (double)truth("2.0", "counted") / 1000, 0.1); /* of six digits */
+    const unsigned long start = cycles_so_far();
+    for (unsigned i = 0; i < PHASES; i++)
+        run_phase(i, wanted_cycles() / PHASES);
+    if (!went_round)
+        expect_near("ppmc.0.encoder.00.position", (double)truth("2.0", "counted") / 1000,
+                    fabs((double)truth("2.0", "counted")) * 1e-8); /* of six digits */
+    if (wanted_cycles() > SHORT_RUN)
+        printf("%lu cycles, encoder 0 at %" PRId64 ", no difference%s; timeouts %g, bad data %g\n",
+               cycles_so_far() - start, truth("2.0", "counted"), went_round ? " but whole rounds" : "",
+               look_at("ppmc.0.timeouts"), look_at("ppmc.0.bad-data"));
     tell_sim("faults 1000 timeout zeros ones residue");
-    turn_all(20);
+    turn_all(0, true);
+    wait_for_cycles(2000);
+    turn_all(0, false);
     tell_sim("faults 0");
+    look_for_rounds();
     compare_all();
     expect_pin("ppmc.0.fault", 0);
     ck_assert(look_at("ppmc.0.timeouts") > 0 && look_at("ppmc.0.bad-data") > 0);
@@ -292,6 +385,7 @@ START_TEST(the_example_counts_exactly_in_linuxcnc)
 {
     const char *const argv[] = {TEST_SOURCE "/tests/system/halrun-user", "-", NULL};
     const char *skip;
+    char seconds[32];
     if (TEST_SANITIZED || access(TEST_BUILD "/linuxcnc/ppmc_epp.so", R_OK) != 0) {
         printf("SKIP: %s\n", TEST_SANITIZED ? "a component built with a sanitizer cannot be loaded into LinuxCNC"
                                             : "LinuxCNC's headers are not installed (linuxcnc-uspace-dev)");
@@ -300,16 +394,110 @@ START_TEST(the_example_counts_exactly_in_linuxcnc)
     start_sim("board 4");
     ck_assert_int_eq(setenv("PPMC", path, 1), 0);
     ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
+    snprintf(seconds, sizeof seconds, "%lu", 100 + wanted_cycles() / 1000);
+    ck_assert_int_eq(setenv("PEER_SECONDS", seconds, 1), 0);
     process_start_listening(&host, argv);
     say_example();
     if (process_wait_line(&host, "SKIP: ", 2000, &skip)) {
         printf("%s\n", skip);
+        stop_sim();
         return;
     }
     run_example();
     process_hush(&host);
     ck_assert_msg(process_wait_end(&host, END_MS), "halrun: %s", host.text);
     stop_sim();
+}
+END_TEST
+
+/* ---- boards whose shafts turn with the step generators of a card ---------------------------------------------------
+ */
+
+#define STEPGENS 5u
+
+static void say(const char *const format, ...)
+{
+    char line[160];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(line, sizeof line, format, args);
+    va_end(args);
+    process_say(&host, line);
+}
+
+static void say_steps(const char *const address)
+{
+    say("loadrt hm2_lbp16 board_ip=%s config=num_stepgens=5\n", address);
+    say("loadrt ppmc_epp bus=sim:%s enc_clock=0xA00,0xA02 expect=0x00,0x02\n", path);
+    say("loadrt threads name1=servo period1=1000000\n");
+    say("addf hm2_7i96s.0.read servo\naddf ppmc.0.read servo\n");
+    say("addf hm2_7i96s.0.write servo\naddf ppmc.0.write servo\n");
+    say("setp hm2_7i96s.0.packet-read-timeout 100000000\nsetp hm2_7i96s.0.watchdog.timeout_ns 4000000000\n");
+    for (unsigned i = 0; i < STEPGENS; i++) {
+        say("setp hm2_7i96s.0.stepgen.%02u.steplen 1000\nsetp hm2_7i96s.0.stepgen.%02u.stepspace 1000\n", i, i);
+        say("setp hm2_7i96s.0.stepgen.%02u.maxaccel 0\nsetp hm2_7i96s.0.stepgen.%02u.maxvel 0\n", i, i);
+        say("setp hm2_7i96s.0.stepgen.%02u.control-type 1\nsetp hm2_7i96s.0.stepgen.%02u.enable 1\n", i, i);
+    }
+    say("start\n");
+}
+
+static double pin_of(const char *const format, const unsigned number)
+{
+    char pin[64];
+    snprintf(pin, sizeof pin, format, number);
+    return look_at(pin);
+}
+
+/* At rest, which is soon, the encoders have counted the steps that the card says it has made. */
+static void compare_steps(void)
+{
+    for (unsigned i = 0; i < STEPGENS; i++) {
+        double steps = 0, count = 1;
+        for (unsigned looks = 0; looks < LOOKS && count != steps; looks++) {
+            usleep(LOOK_US);
+            steps = pin_of("hm2_7i96s.0.stepgen.%02u.counts", i);
+            count = pin_of("ppmc.0.encoder.%02u.count", i);
+        }
+        if (count != steps)
+            ck_abort_msg("stepgen %u made %g steps, the encoder counted %g", i, steps, count);
+    }
+}
+
+START_TEST(encoders_count_the_steps_of_a_simulated_card)
+{
+    static const double speeds[][STEPGENS] = {{400000, -123456, 1000, -33.5, 77777}, {-250000, 499000, -999, 0, 1}};
+    static struct simulator card;
+    const char *const argv[] = {process_built("hm2host"), NULL};
+    snprintf(path, sizeof path, "/tmp/check-ppmc-%d", (int)getpid());
+    simulator_start(&card, (const char *const[]){"--ppmc", path, NULL});
+    process_start_listening(&host, argv);
+    say_steps(card.address[0]);
+    for (unsigned n = 0; n < 2; n++) {
+        const double before = pin_of("ppmc.0.encoder.%02u.count", 1);
+        for (unsigned i = 0; i < STEPGENS; i++)
+            say("setp hm2_7i96s.0.stepgen.%02u.velocity-cmd %.1f\n", i, speeds[n][i]);
+        for (unsigned i = 0; i < LOOKS && fabs(pin_of("ppmc.0.encoder.%02u.count", 1) - before) < 100000; i++)
+            usleep(LOOK_US);
+        for (unsigned i = 0; i < STEPGENS; i++)
+            say("setp hm2_7i96s.0.stepgen.%02u.velocity-cmd 0\n", i);
+        compare_steps();
+        ck_assert(fabs(pin_of("ppmc.0.encoder.%02u.count", 1) - before) >= 100000);
+    }
+    process_hush(&host);
+    ck_assert_msg(process_wait_end(&host, END_MS) && host.status == 0, "hm2host: %s", host.text);
+    simulator_stop(&card);
+    for (unsigned i = 0; i < STEPGENS; i++) {
+        long long counted, edges, illegal;
+        char start[64];
+        const char *line;
+        snprintf(start, sizeof start, "7i96s@%s:27181: ppmc %u.%u counted ", card.address[0], i / 4 * 2, i % 4);
+        ck_assert_msg(process_wait_line(&card.process, start, 0, &line), "no %s in %s", start, card.process.text);
+        ck_assert_int_eq(sscanf(line + strlen(start), "%lld of %lld edges, illegal %lld", &counted, &edges, &illegal),
+                         3);
+        ck_assert_int_eq(counted, edges);
+        ck_assert_int_eq(illegal, 0);
+    }
+    ck_assert_int_ne(access(path, F_OK), 0);
 }
 END_TEST
 
@@ -383,7 +571,7 @@ int main(void)
 {
     Suite *const suite = suite_create("PPMC");
     TCase *const tests = tcase_create("programs");
-    tcase_set_timeout(tests, 120);
+    tcase_set_timeout(tests, 120 + (double)wanted_cycles() / 1000);
     tcase_add_test(tests, the_tool_says_what_is_there_and_what_is_wrong);
     tcase_add_test(tests, watching_shows_live_counts_and_leaves_the_counters);
     tcase_add_test(tests, a_bus_that_is_not_there_is_told);
@@ -392,6 +580,10 @@ int main(void)
     tcase_add_test(tests, the_cycle_calls_nothing_that_allocates_locks_or_formats);
     tcase_add_test(tests, the_servo_thread_makes_no_system_call_but_those_of_the_bus_and_its_sleep);
     suite_add_tcase(suite, tests);
+    TCase *const steps = tcase_create("steps");
+    tcase_set_timeout(steps, 120);
+    tcase_add_test(steps, encoders_count_the_steps_of_a_simulated_card);
+    suite_add_tcase(suite, steps);
     SRunner *const runner = srunner_create(suite);
     srunner_run_all(runner, CK_ENV);
     const int failed = srunner_ntests_failed(runner);

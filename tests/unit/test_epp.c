@@ -21,7 +21,9 @@
 #define FAKE_FD     9999
 #define BASE        0x378
 
+/* What a test works with; clean_up() releases it, also when the test has failed half-way. */
 static struct sim_ppmc *bus;
+static struct epp *epp;
 
 static void new_bus(void)
 {
@@ -30,8 +32,21 @@ static void new_bus(void)
     assert_int_equal(sim_ppmc_add(bus, 2, 0x14), 0);
 }
 
+static void close_bus(void)
+{
+    epp_close(epp);
+    epp = NULL;
+}
+
+static void free_bus(void)
+{
+    close_bus();
+    sim_ppmc_free(bus);
+    bus = NULL;
+}
+
 /* What every back end must do: identify the board, write and read blocks, stop at a cycle that nobody answers. */
-static void works_like_a_bus(struct epp *const epp)
+static void works_like_a_bus(void)
 {
     uint8_t id_at = 0x2F, base = 0x20, nowhere = 0x60, id = 0, value[3] = {0x11, 0x22, 0x33}, block[16] = {0};
     const struct epp_step identify[] = {{EPP_ADDRESS_WRITE, 1, &id_at}, {EPP_DATA_READ, 1, &id}};
@@ -82,39 +97,33 @@ static void fake_out(void *const context, const uint16_t port, const uint8_t val
     sim_ppmc_port_out(bus, (unsigned)port - BASE, value);
 }
 
-static struct epp *open_port(const bool reverse)
+static void open_port(const bool reverse)
 {
     static const struct epp_port_io io = {.in = fake_in, .out = fake_out};
     const struct epp_port_options options = {.base = BASE, .ecr_base = BASE + 0x400, .reverse = reverse, .io = &io};
-    struct epp *epp = NULL;
     struct hm2_diag diag = {0};
     /* As a computer's firmware leaves a port: boards held in reset, an address strobe that never ends, SPP mode. */
     sim_ppmc_port_out(bus, 2, 0x0C);
     assert_int_equal(epp_port_open(&epp, &options, &diag), 0);
-    return epp;
 }
 
 static void a_port_is_a_bus(void **state)
 {
     (void)state;
     new_bus();
-    struct epp *const epp = open_port(false);
-    works_like_a_bus(epp);
+    open_port(false);
+    works_like_a_bus();
     assert_int_equal(direction_seen, 0x04);
     assert_int_equal(sim_ppmc_port_in(bus, 1) & 1, 0); /* the time-out bit is cleared */
-    epp_close(epp);
-    sim_ppmc_free(bus);
 }
 
 static void a_ports_direction_is_commanded_where_asked(void **state)
 {
     (void)state;
     new_bus();
-    struct epp *const epp = open_port(true);
-    works_like_a_bus(epp);
+    open_port(true);
+    works_like_a_bus();
     assert_int_equal(direction_seen, 0x24);
-    epp_close(epp);
-    sim_ppmc_free(bus);
 }
 
 /* ---- ppdev: what the kernel does, as far as a program sees it (ppmc.md section 10.1) ------------------------------
@@ -247,18 +256,17 @@ static void the_kernels_driver_is_a_bus_and_is_left_without_a_reset(void **state
 {
     (void)state;
     for (unsigned reverse = 0; reverse < 2; reverse++) {
-        struct epp *epp = NULL;
         struct hm2_diag diag = {0};
         new_bus();
         reset_device();
         assert_int_equal(epp_open(&epp, FAKE_DEVICE, reverse != 0, &diag), 0);
-        works_like_a_bus(epp);
+        works_like_a_bus();
         assert_int_equal(device.reversed, reverse);
         assert_int_equal(device.negotiations, 0);
-        epp_close(epp);
+        close_bus();
         assert_false(device.open || device.claimed);
         assert_int_equal(sim_ppmc_registers(bus, 2).assembly, 0x332211); /* no reset */
-        sim_ppmc_free(bus);
+        free_bus();
     }
 }
 
@@ -270,7 +278,6 @@ static void a_list_takes_one_call_a_step_and_one_a_change_of_mode(void **state)
                                      {EPP_DATA_READ, 16, block},
                                      {EPP_ADDRESS_WRITE, 1, &base},
                                      {EPP_DATA_READ, 12, block}};
-    struct epp *epp = NULL;
     struct epp_done done;
     new_bus();
     reset_device();
@@ -278,14 +285,11 @@ static void a_list_takes_one_call_a_step_and_one_a_change_of_mode(void **state)
     device.calls = 0;
     assert_int_equal(epp_run(epp, steps, 4, &done), 0);
     assert_int_equal(device.calls, 8);
-    epp_close(epp);
-    sim_ppmc_free(bus);
 }
 
 static void a_port_that_cannot_be_had_is_refused_with_the_reason(void **state)
 {
     (void)state;
-    struct epp *epp = NULL;
     struct hm2_diag diag = {0};
     new_bus();
     reset_device();
@@ -302,7 +306,6 @@ static void a_port_that_cannot_be_had_is_refused_with_the_reason(void **state)
     device.refuse_mode = true;
     assert_int_equal(epp_open(&epp, FAKE_DEVICE, false, &diag), HM2_ERR_IO);
     assert_int_equal(epp_open(&epp, "/dev/parport-that-is-not-there", false, &diag), HM2_ERR_IO);
-    sim_ppmc_free(bus);
 }
 
 /* ---- names --------------------------------------------------------------------------------------------------------
@@ -327,7 +330,6 @@ static void names_of_no_bus_are_refused(void **state)
                                         "012345678901234567890123456789012345678901234567890123456789012345678901234567"
                                         "8901234567890123456789012345678901234567890"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-        struct epp *epp = NULL;
         struct hm2_diag diag = {0};
         if (epp_open(&epp, names[i], false, &diag) != HM2_ERR_INVALID || diag.problems != 1)
             fail_msg("\"%s\" is not refused: %s", names[i], diag.text);
@@ -340,12 +342,13 @@ static void names_of_no_bus_are_refused(void **state)
 /* What a peer answers, as a change of the right reply. */
 enum nonsense { HONEST, SILENT, SHORT, LONG, MANY_STEPS, HALF, WRONG_NUMBER_FIRST, ENDS };
 
-struct peer {
-    int listener;
+static struct {
     enum nonsense how;
-    char path[64];
+    int listener; /* -1 = none */
+    bool runs;
+    char folder[32], path[64];
     pthread_t thread;
-};
+} peer = {.listener = -1};
 
 static size_t distort(const enum nonsense how, uint8_t *const reply, const size_t len)
 {
@@ -362,18 +365,18 @@ static size_t distort(const enum nonsense how, uint8_t *const reply, const size_
 
 static void *peer_main(void *const context)
 {
-    const struct peer *const peer = context;
+    (void)context;
     uint8_t request[EPP_WIRE_MAX_BYTES], reply[EPP_WIRE_MAX_BYTES + 1];
-    const int fd = accept(peer->listener, NULL, NULL);
+    const int fd = accept(peer.listener, NULL, NULL);
     for (;;) {
         const ssize_t len = recv(fd, request, sizeof request, 0);
-        if (len <= 0 || peer->how == ENDS)
+        if (len <= 0 || peer.how == ENDS)
             break;
         size_t answer = sim_ppmc_serve(bus, request, (size_t)len, reply);
-        if (peer->how == SILENT || answer == 0)
+        if (peer.how == SILENT || answer == 0)
             continue;
-        answer = distort(peer->how, reply, answer);
-        if (peer->how == WRONG_NUMBER_FIRST) {
+        answer = distort(peer.how, reply, answer);
+        if (peer.how == WRONG_NUMBER_FIRST) {
             reply[0]++;
             (void)send(fd, reply, answer, MSG_NOSIGNAL);
             reply[0]--;
@@ -384,41 +387,48 @@ static void *peer_main(void *const context)
     return NULL;
 }
 
-static struct epp *start_peer(struct peer *const peer, const enum nonsense how)
+/* A clock that jumps, as a virtual machine's may, must not end a wait for an answer that will come. */
+#define NO_LIMIT_NS INT64_C(1000000000000000)
+
+static void start_peer(const enum nonsense how)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
-    struct epp *epp = NULL;
-    peer->how = how;
-    (void)snprintf(peer->path, sizeof peer->path, "/tmp/test-epp-%d", (int)getpid());
-    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", peer->path);
-    unlink(peer->path);
-    peer->listener = socket(AF_UNIX, SOCK_SEQPACKET, 0);
-    assert_int_equal(bind(peer->listener, (const struct sockaddr *)&address, sizeof address), 0);
-    assert_int_equal(listen(peer->listener, 1), 0);
-    assert_int_equal(pthread_create(&peer->thread, NULL, peer_main, peer), 0);
-    /* On a busy machine an answer may take its time. */
-    assert_int_equal(epp_socket_open(&epp, peer->path, how == SILENT ? 20000000 : INT64_C(20000000000), NULL), 0);
-    return epp;
+    (void)snprintf(peer.folder, sizeof peer.folder, "/tmp/test-epp-XXXXXX");
+    assert_non_null(mkdtemp(peer.folder));
+    (void)snprintf(peer.path, sizeof peer.path, "%s/bus", peer.folder);
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", peer.path);
+    peer.how = how;
+    peer.listener = socket(AF_UNIX, SOCK_SEQPACKET, 0);
+    assert_int_equal(bind(peer.listener, (const struct sockaddr *)&address, sizeof address), 0);
+    assert_int_equal(listen(peer.listener, 1), 0);
+    assert_int_equal(pthread_create(&peer.thread, NULL, peer_main, NULL), 0);
+    peer.runs = true;
+    assert_int_equal(epp_socket_open(&epp, peer.path, how == SILENT ? 20000000 : NO_LIMIT_NS, NULL), 0);
 }
 
-static void end_peer(struct peer *const peer, struct epp *const epp)
+static void end_peer(void)
 {
-    epp_close(epp);
-    pthread_join(peer->thread, NULL);
-    close(peer->listener);
-    unlink(peer->path);
+    close_bus();
+    if (peer.listener < 0)
+        return;
+    (void)shutdown(peer.listener, SHUT_RDWR); /* nobody may have connected */
+    if (peer.runs)
+        pthread_join(peer.thread, NULL);
+    close(peer.listener);
+    unlink(peer.path);
+    rmdir(peer.folder);
+    peer.listener = -1;
+    peer.runs = false;
 }
 
 static void a_simulators_socket_is_a_bus(void **state)
 {
     (void)state;
-    struct peer peer;
     new_bus();
-    struct epp *epp = start_peer(&peer, HONEST);
-    works_like_a_bus(epp);
-    end_peer(&peer, epp);
+    start_peer(HONEST);
+    works_like_a_bus();
+    end_peer();
     assert_int_equal(epp_socket_open(&epp, peer.path, 1, NULL), HM2_ERR_IO);
-    sim_ppmc_free(bus);
 }
 
 static void a_peer_that_answers_nonsense_is_an_error_and_reads_nothing(void **state)
@@ -435,15 +445,65 @@ static void a_peer_that_answers_nonsense_is_an_error_and_reads_nothing(void **st
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         uint8_t at = 0x2F, id = 0;
         const struct epp_step steps[] = {{EPP_ADDRESS_WRITE, 1, &at}, {EPP_DATA_READ, 1, &id}};
-        struct peer peer;
         struct epp_done done;
-        struct epp *const epp = start_peer(&peer, rows[i].how);
+        start_peer(rows[i].how);
         assert_int_equal(epp_run(epp, steps, 2, &done), rows[i].want);
         assert_int_equal(id, rows[i].want == 0 ? 0x14 : 0);
         assert_int_equal(done.steps, rows[i].want == 0 ? 2 : 0);
-        end_peer(&peer, epp);
+        end_peer();
     }
-    sim_ppmc_free(bus);
+}
+
+static void a_server_takes_eight_clients_and_no_other_server_at_its_path(void **state)
+{
+    (void)state;
+    struct sim_ppmc_server *server = NULL, *second = NULL;
+    struct hm2_diag diag = {0};
+    struct epp *clients[9] = {NULL};
+    char folder[] = "/tmp/test-epp-XXXXXX", path[64], longest[200];
+    uint8_t at = 0x2F;
+    const struct epp_step step = {EPP_ADDRESS_WRITE, 1, &at};
+    struct epp_done done;
+    int refused = 0;
+    assert_non_null(mkdtemp(folder));
+    (void)snprintf(path, sizeof path, "%s/bus", folder);
+    memset(longest, 'x', sizeof longest - 1);
+    longest[sizeof longest - 1] = '\0';
+    new_bus();
+    assert_int_equal(sim_ppmc_server_open(&server, longest, &diag), HM2_ERR_INVALID);
+    assert_int_equal(sim_ppmc_server_open(&server, "", &diag), HM2_ERR_INVALID);
+    assert_int_equal(sim_ppmc_server_open(&server, path, NULL), 0);
+    assert_int_equal(sim_ppmc_server_open(&second, path, &diag), HM2_ERR_IO);
+    for (unsigned i = 0; i < 9; i++) {
+        assert_int_equal(epp_socket_open(&clients[i], path, 1, NULL), 0);
+        sim_ppmc_server_run(server, bus); /* accepts one, at first the second server, which had tried who listens */
+        sim_ppmc_server_run(server, bus);
+    }
+    for (unsigned i = 0; i < 9; i++) { /* the first eight are heard, and nobody is there to answer them in time */
+        refused += epp_run(clients[i], &step, 1, &done) == HM2_ERR_IO;
+        epp_close(clients[i]);
+    }
+    assert_int_equal(refused, 1);
+    sim_ppmc_server_run(server, bus);
+    assert_int_equal(sim_ppmc_stats(bus).cycles, 8);
+    sim_ppmc_server_close(server);
+    assert_int_equal(rmdir(folder), 0); /* it has removed its socket */
+}
+
+static void a_socket_that_a_killed_server_left_is_replaced(void **state)
+{
+    (void)state;
+    struct sim_ppmc_server *server = NULL;
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    char folder[] = "/tmp/test-epp-XXXXXX";
+    const int fd = socket(AF_UNIX, SOCK_SEQPACKET, 0);
+    assert_non_null(mkdtemp(folder));
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/bus", folder);
+    assert_int_equal(bind(fd, (const struct sockaddr *)&address, sizeof address), 0);
+    close(fd);
+    assert_int_equal(sim_ppmc_server_open(&server, address.sun_path, NULL), 0);
+    sim_ppmc_server_close(server);
+    assert_int_equal(rmdir(folder), 0);
 }
 
 static void requests_that_are_none_are_not_answered(void **state)
@@ -466,21 +526,30 @@ static void requests_that_are_none_are_not_answered(void **state)
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
         assert_int_equal(sim_ppmc_serve(bus, rows[i].bytes, rows[i].len, reply), 0);
     assert_int_equal(sim_ppmc_stats(bus).cycles, 0);
-    sim_ppmc_free(bus);
+}
+
+static int clean_up(void **state)
+{
+    (void)state;
+    end_peer();
+    free_bus();
+    return 0;
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_port_is_a_bus),
-        cmocka_unit_test(a_ports_direction_is_commanded_where_asked),
-        cmocka_unit_test(the_kernels_driver_is_a_bus_and_is_left_without_a_reset),
-        cmocka_unit_test(a_list_takes_one_call_a_step_and_one_a_change_of_mode),
-        cmocka_unit_test(a_port_that_cannot_be_had_is_refused_with_the_reason),
-        cmocka_unit_test(names_of_no_bus_are_refused),
-        cmocka_unit_test(a_simulators_socket_is_a_bus),
-        cmocka_unit_test(a_peer_that_answers_nonsense_is_an_error_and_reads_nothing),
-        cmocka_unit_test(requests_that_are_none_are_not_answered),
+        cmocka_unit_test_teardown(a_port_is_a_bus, clean_up),
+        cmocka_unit_test_teardown(a_ports_direction_is_commanded_where_asked, clean_up),
+        cmocka_unit_test_teardown(the_kernels_driver_is_a_bus_and_is_left_without_a_reset, clean_up),
+        cmocka_unit_test_teardown(a_list_takes_one_call_a_step_and_one_a_change_of_mode, clean_up),
+        cmocka_unit_test_teardown(a_port_that_cannot_be_had_is_refused_with_the_reason, clean_up),
+        cmocka_unit_test_teardown(names_of_no_bus_are_refused, clean_up),
+        cmocka_unit_test_teardown(a_simulators_socket_is_a_bus, clean_up),
+        cmocka_unit_test_teardown(a_peer_that_answers_nonsense_is_an_error_and_reads_nothing, clean_up),
+        cmocka_unit_test_teardown(a_server_takes_eight_clients_and_no_other_server_at_its_path, clean_up),
+        cmocka_unit_test_teardown(a_socket_that_a_killed_server_left_is_replaced, clean_up),
+        cmocka_unit_test_teardown(requests_that_are_none_are_not_answered, clean_up),
     };
     return cmocka_run_group_tests_name("EPP", tests, NULL, NULL);
 }

@@ -77,14 +77,32 @@ static const struct {
     const char *name;
     unsigned want;
 } reads[] = {
-    {0, "axis 0 low byte", 0x01},        {1, "axis 0 mid byte", 0x02},        {2, "axis 0 hi byte", 0x03},
-    {3, "axis 1 low byte", 0x11},        {4, "axis 1 mid byte", 0x12},        {5, "axis 1 hi byte", 0x13},
-    {6, "axis 2 low byte", 0x21},        {7, "axis 2 mid byte", 0x22},        {8, "axis 2 hi byte", 0x23},
-    {9, "axis 3 low byte", 0x31},        {10, "axis 3 mid byte", 0x32},       {11, "axis 3 hi byte", 0x33},
-    {12, "index sense register", 0x00},  {15, "module ID code", 0x14},        {16, "axis 0 timestamp low", 0xE9},
-    {17, "axis 0 timestamp high", 0x03}, {18, "axis 1 timestamp low", 0xD1},  {19, "axis 1 timestamp high", 0x07},
-    {20, "axis 2 timestamp low", 0xB9},  {21, "axis 2 timestamp high", 0x0B}, {22, "axis 3 timestamp low", 0xA1},
-    {23, "axis 3 timestamp high", 0x0F}, {24, "timestamp counter low", 0x88}, {25, "timestamp counter high", 0x13},
+    {0, "axis 0 low byte", 0x01},
+    {1, "axis 0 mid byte", 0x02},
+    {2, "axis 0 hi byte", 0x03},
+    {3, "axis 1 low byte", 0x11},
+    {4, "axis 1 mid byte", 0x12},
+    {5, "axis 1 hi byte", 0x13},
+    {6, "axis 2 low byte", 0x21},
+    {7, "axis 2 mid byte", 0x22},
+    {8, "axis 2 hi byte", 0x23},
+    {9, "axis 3 low byte", 0x31},
+    {10, "axis 3 mid byte", 0x32},
+    {11, "axis 3 hi byte", 0x33},
+    {12, "index sense register", 0x00},
+    {13, "not used", 0x00},
+    {14, "not used", 0x00},
+    {15, "module ID code", 0x14},
+    {16, "axis 0 timestamp low", 0xE9},
+    {17, "axis 0 timestamp high", 0x03},
+    {18, "axis 1 timestamp low", 0xD1},
+    {19, "axis 1 timestamp high", 0x07},
+    {20, "axis 2 timestamp low", 0xB9},
+    {21, "axis 2 timestamp high", 0x0B},
+    {22, "axis 3 timestamp low", 0xA1},
+    {23, "axis 3 timestamp high", 0x0F},
+    {24, "timestamp counter low", 0x88},
+    {25, "timestamp counter high", 0x13},
 };
 
 static void every_register_of_the_seeds_table_reads_what_it_says(void **state)
@@ -196,6 +214,54 @@ static void a_strict_board_needs_its_load_bits_for_2_us(void **state)
     put_at(bus, 3, 0);
     assert_int_equal(sim_ppmc_truth(bus, SLOT, 0).counter, 0x56);
     sim_ppmc_free(bus);
+}
+
+/* seed 004, "Timer Register Bits": none, none, soft latch, master, tim3 to tim0. No document tells which rates the
+ * latter stand for, so here they stand for those that the options say, and by default for none. */
+static const struct {
+    const char *name;
+    unsigned bits;
+    uint64_t latches;
+} timer_bits[] = {{"nothing", 0x00, 0}, {"no function", 0xC0, 0}, {"soft latch", 0x20, 1},
+                  {"rates", 0x0F, 0},   {"master", 0x1A, 10},     {"all", 0xFF, 1}};
+
+static void each_bit_of_the_timer_register_does_what_it_says(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof timer_bits / sizeof timer_bits[0]; i++) {
+        struct sim_ppmc_options options = {.master_ns = {[0xA] = 100000}};
+        struct sim_ppmc *const bus = board_of(0x14, &options);
+        sim_ppmc_set_rate(bus, SLOT, 2, 100000);
+        wait_us(bus, 95);
+        put_at(bus, 4, timer_bits[i].bits);
+        wait_us(bus, 1050);
+        const struct sim_ppmc_truth truth = sim_ppmc_truth(bus, SLOT, 2);
+        if (sim_ppmc_stats(bus).latches != timer_bits[i].latches || (truth.holding > 0) != (timer_bits[i].latches > 0))
+            fail_msg("%s: %" PRIu64 " latch pulses, holding %u", timer_bits[i].name, sim_ppmc_stats(bus).latches,
+                     truth.holding);
+        sim_ppmc_free(bus);
+    }
+}
+
+static void a_masters_pulses_reach_all_boards_at_the_rate_that_it_is_set_to(void **state)
+{
+    (void)state;
+    for (unsigned rate = 0; rate < 16; rate++) {
+        struct sim_ppmc_options options = {0};
+        for (unsigned i = 0; i < 16; i++)
+            options.master_ns[i] = 10000 * (i + 1);
+        struct sim_ppmc *const bus = board_of(0x14, &options);
+        assert_int_equal(sim_ppmc_add(bus, 6, 0x14), 0);
+        sim_ppmc_set_rate(bus, 6, 1, 1000000); /* the counter is the time in us */
+        put_at(bus, 4, 0x10 | rate);
+        const int64_t start_us = sim_ppmc_now_ns(bus) / 1000;
+        wait_us(bus, 100000);
+        const int64_t pulses = 100000 / (10 * (rate + 1));
+        const uint32_t holding = sim_ppmc_truth(bus, 6, 1).holding;
+        assert_int_equal(sim_ppmc_stats(bus).latches, 2 * pulses);
+        assert_in_range(holding, start_us + pulses * 10 * (rate + 1) - 2, start_us + pulses * 10 * (rate + 1));
+        sim_ppmc_free(bus);
+    }
 }
 
 /* seed 004, "Index Preset Register Bits" and "Index Sense Register Bits" */
@@ -320,6 +386,41 @@ static void a_board_answers_at_its_two_slots_and_nowhere_else(void **state)
     sim_ppmc_free(bus);
 }
 
+/* seed 004, "DIP switch at SW1": switch 4 counts most, on is 0 and off is 1, and the newer boards take two units. */
+static const struct {
+    const char *switches; /* 4, 3, 2, 1 */
+    uint8_t id;
+    int err;
+    unsigned first, last;
+} switches[] = {
+    {"1111", 0x12, 0, 0x00, 0x0F},       {"1110", 0x12, 0, 0x10, 0x1F}, {"1101", 0x12, 0, 0x20, 0x2F},
+    {"1011", 0x12, 0, 0x40, 0x4F},       {"0111", 0x12, 0, 0x80, 0x8F}, {"0000", 0x12, 0, 0xF0, 0xFF},
+    {"1111", 0x14, 0, 0x00, 0x1F},       {"1101", 0x14, 0, 0x20, 0x3F}, {"1011", 0x14, 0, 0x40, 0x5F},
+    {"0111", 0x14, 0, 0x80, 0x9F},       {"0001", 0x14, 0, 0xE0, 0xFF}, {"1110", 0x14, HM2_ERR_RANGE, 0, 0},
+    {"0000", 0x14, HM2_ERR_RANGE, 0, 0},
+};
+
+static void the_address_switches_choose_the_range(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof switches / sizeof switches[0]; i++) {
+        struct sim_ppmc *const bus = sim_ppmc_new(NULL);
+        unsigned slot = 0;
+        for (unsigned k = 0; k < 4; k++) /* on is 1 in the table, and 0 on the board */
+            slot = slot << 1 | (switches[i].switches[k] == '0');
+        assert_int_equal(sim_ppmc_add(bus, slot, switches[i].id), switches[i].err);
+        for (unsigned at = 0; at < 0x100 && switches[i].err == 0; at++) {
+            uint8_t byte = 0;
+            assert_true(address(bus, at));
+            const bool answers = sim_ppmc_cycle(bus, EPP_DATA_READ, &byte);
+            if (answers != (at >= switches[i].first && at <= switches[i].last))
+                fail_msg("switches %s, ID 0x%02X: address 0x%02X %s", switches[i].switches, switches[i].id, at,
+                         answers ? "answers" : "does not answer");
+        }
+        sim_ppmc_free(bus);
+    }
+}
+
 static void the_address_counts_on_after_every_data_byte(void **state)
 {
     (void)state;
@@ -370,7 +471,8 @@ static void one_boards_soft_latch_latches_all_boards_once(void **state)
     wait_us(bus, 100);
     put_at(bus, 4, 0x20); /* no 0 between: no pulse */
     wait_us(bus, 100);
-    (void)sim_ppmc_truth(bus, 6, 0); /* a board lives when it is looked at */
+    (void)sim_ppmc_truth(bus, SLOT, 0); /* a board lives when it is looked at */
+    (void)sim_ppmc_truth(bus, 6, 0);
     assert_int_equal(sim_ppmc_stats(bus).latches, 4);
     sim_ppmc_free(bus);
 }
@@ -423,11 +525,14 @@ int main(void)
         cmocka_unit_test(offsets_without_a_register_take_nothing),
         cmocka_unit_test(each_load_bit_loads_its_axis),
         cmocka_unit_test(a_strict_board_needs_its_load_bits_for_2_us),
+        cmocka_unit_test(each_bit_of_the_timer_register_does_what_it_says),
+        cmocka_unit_test(a_masters_pulses_reach_all_boards_at_the_rate_that_it_is_set_to),
         cmocka_unit_test(an_index_sets_its_sense_bit_and_presets_where_asked),
         cmocka_unit_test(each_filter_rate_counts_up_to_its_limit_and_nothing_beyond),
         cmocka_unit_test(a_glitch_shorter_than_the_filter_is_no_count),
         cmocka_unit_test(steady_motion_counts_as_single_edges_do),
         cmocka_unit_test(a_board_answers_at_its_two_slots_and_nowhere_else),
+        cmocka_unit_test(the_address_switches_choose_the_range),
         cmocka_unit_test(the_address_counts_on_after_every_data_byte),
         cmocka_unit_test(the_counter_wraps_without_a_flag),
         cmocka_unit_test(one_boards_soft_latch_latches_all_boards_once),

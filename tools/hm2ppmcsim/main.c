@@ -8,24 +8,21 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/signalfd.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "commands.h"
 
-#define NS_PER_S    1000000000
-#define MAX_CLIENTS 8u
-#define EXIT_USAGE  2
+#define NS_PER_S   1000000000
+#define EXIT_USAGE 2
 
-enum { SOURCE_SIGNAL, SOURCE_INPUT, SOURCE_LISTENER, SOURCE_CLIENTS };
+enum { SOURCE_SIGNAL, SOURCE_INPUT, SOURCE_CLIENTS, SOURCES };
 
 struct program {
     struct sim_ppmc *bus;
-    const char *path;
+    struct sim_ppmc_server *server;
     struct timespec start;
-    struct pollfd sources[SOURCE_CLIENTS + MAX_CLIENTS];
+    struct pollfd sources[SOURCES];
     char line[256]; /* of standard input so far */
     size_t line_len;
 };
@@ -38,33 +35,6 @@ static void tell_time(const struct program *const p)
 }
 
 /* ---- sources of events ------------------------------------------------------------------------------------------- */
-
-static void accept_client(struct program *const p)
-{
-    const int fd = accept4(p->sources[SOURCE_LISTENER].fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    for (unsigned i = 0; fd >= 0 && i < MAX_CLIENTS; i++)
-        if (p->sources[SOURCE_CLIENTS + i].fd < 0) {
-            p->sources[SOURCE_CLIENTS + i].fd = fd;
-            return;
-        }
-    if (fd >= 0)
-        close(fd);
-}
-
-static void serve(struct program *const p, struct pollfd *const client)
-{
-    uint8_t request[EPP_WIRE_MAX_BYTES], reply[EPP_WIRE_MAX_BYTES];
-    const ssize_t len = recv(client->fd, request, sizeof request, MSG_TRUNC);
-    if (len < 0 && (errno == EAGAIN || errno == EINTR))
-        return;
-    tell_time(p);
-    const bool fits = len > 0 && (size_t)len <= sizeof request;
-    const size_t answer = fits ? sim_ppmc_serve(p->bus, request, (size_t)len, reply) : 0;
-    if (answer > 0 && send(client->fd, reply, answer, MSG_NOSIGNAL) == (ssize_t)answer)
-        return;
-    close(client->fd);
-    client->fd = -1;
-}
 
 static void run_line(struct program *const p)
 {
@@ -93,7 +63,7 @@ static void take_input(struct program *const p)
 static int run(struct program *const p)
 {
     for (;;) {
-        if (poll(p->sources, SOURCE_CLIENTS + MAX_CLIENTS, -1) < 0 && errno != EINTR) {
+        if (poll(p->sources, SOURCES, -1) < 0 && errno != EINTR) {
             fprintf(stderr, "hm2ppmcsim: waiting failed: %s\n", strerror(errno));
             return EXIT_FAILURE;
         }
@@ -101,49 +71,32 @@ static int run(struct program *const p)
             return EXIT_SUCCESS;
         if (p->sources[SOURCE_INPUT].revents)
             take_input(p);
-        if (p->sources[SOURCE_LISTENER].revents)
-            accept_client(p);
-        for (unsigned i = 0; i < MAX_CLIENTS; i++)
-            if (p->sources[SOURCE_CLIENTS + i].fd >= 0 && p->sources[SOURCE_CLIENTS + i].revents)
-                serve(p, &p->sources[SOURCE_CLIENTS + i]);
+        if (p->sources[SOURCE_CLIENTS].revents) {
+            tell_time(p);
+            sim_ppmc_server_run(p->server, p->bus);
+        }
     }
 }
 
 /* ---- set-up ------------------------------------------------------------------------------------------------------ */
 
-static bool listen_at(struct program *const p)
+static bool prepare(struct program *const p, const char *const path)
 {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    if (strlen(p->path) >= sizeof address.sun_path) {
-        fprintf(stderr, "hm2ppmcsim: --socket: at most %zu characters\n", sizeof address.sun_path - 1);
-        return false;
-    }
-    memcpy(address.sun_path, p->path, strlen(p->path) + 1);
-    const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    p->sources[SOURCE_LISTENER].fd = fd;
-    /* One that nobody listens at any more was left by a program that was killed. */
-    if (fd >= 0 && connect(fd, (const struct sockaddr *)&address, sizeof address) != 0 && errno == ECONNREFUSED)
-        unlink(p->path);
-    if (fd < 0 || bind(fd, (const struct sockaddr *)&address, sizeof address) != 0 || listen(fd, MAX_CLIENTS) != 0) {
-        fprintf(stderr, "hm2ppmcsim: %s: %s\n", p->path, strerror(errno));
-        p->path = NULL; /* not ours to remove */
-        return false;
-    }
-    return true;
-}
-
-static bool prepare(struct program *const p)
-{
+    struct hm2_diag diag = {0};
     sigset_t set;
     sigemptyset(&set);
     sigaddset(&set, SIGINT);
     sigaddset(&set, SIGTERM);
-    for (unsigned i = 0; i < SOURCE_CLIENTS + MAX_CLIENTS; i++)
-        p->sources[i] = (struct pollfd){.fd = -1, .events = POLLIN};
-    p->sources[SOURCE_INPUT].fd = STDIN_FILENO;
-    p->sources[SOURCE_SIGNAL].fd = sigprocmask(SIG_BLOCK, &set, NULL) == 0 ? signalfd(-1, &set, SFD_CLOEXEC) : -1;
+    if (sim_ppmc_server_open(&p->server, path, &diag) != 0) {
+        fprintf(stderr, "hm2ppmcsim: --socket: %s", diag.text);
+        return false;
+    }
+    const int signals = sigprocmask(SIG_BLOCK, &set, NULL) == 0 ? signalfd(-1, &set, SFD_CLOEXEC) : -1;
+    p->sources[SOURCE_SIGNAL] = (struct pollfd){.fd = signals, .events = POLLIN};
+    p->sources[SOURCE_INPUT] = (struct pollfd){.fd = STDIN_FILENO, .events = POLLIN};
+    p->sources[SOURCE_CLIENTS] = (struct pollfd){.fd = sim_ppmc_server_fd(p->server), .events = POLLIN};
     clock_gettime(CLOCK_MONOTONIC, &p->start);
-    return p->sources[SOURCE_SIGNAL].fd >= 0 && listen_at(p);
+    return signals >= 0;
 }
 
 static const char usage[] =
@@ -227,14 +180,13 @@ int main(const int argc, char **const argv)
     if (status >= 0)
         return status;
     status = EXIT_FAILURE;
-    p.path = arguments.path;
     p.bus = sim_ppmc_new(&arguments.bus);
-    if (p.bus && make_boards(p.bus, &arguments) && prepare(&p)) {
-        printf("ready %s\n", p.path);
+    if (p.bus && make_boards(p.bus, &arguments) && prepare(&p, arguments.path)) {
+        printf("ready %s\n", arguments.path);
         fflush(stdout);
         status = run(&p);
-        unlink(p.path);
     }
+    sim_ppmc_server_close(p.server);
     sim_ppmc_free(p.bus);
     return status;
 }

@@ -24,8 +24,9 @@
 
 enum { EXIT_FAILED = 1, EXIT_USAGE = 2 };
 
-/* What an epoll event is about: a station's number, one of these, or the last and the number of a serial line. */
-enum { SOURCE_SIGNAL = MAX_CARDS, SOURCE_TIMER, SOURCE_CONTROL, SOURCE_SERIAL };
+/* What an epoll event is about: a station's number, one of these, or one of the last two and the number of a station
+ * with an EPP bus or of a serial line. */
+enum { SOURCE_SIGNAL = MAX_CARDS, SOURCE_TIMER, SOURCE_CONTROL, SOURCE_PPMC, SOURCE_SERIAL = SOURCE_PPMC + MAX_CARDS };
 
 struct program {
     struct options options;
@@ -78,7 +79,8 @@ static int open_stations(struct program *const p, struct hm2_diag *const diag)
         const int err = station_open(&p->stations[i], &p->options, &p->options.cards[i], p->options.seed + i, diag);
         if (err)
             return err;
-        if (watch(p, p->stations[i].socket, i))
+        if (watch(p, p->stations[i].socket, i) ||
+            (p->options.cards[i].ppmc && watch(p, sim_ppmc_server_fd(p->stations[i].ppmc.server), SOURCE_PPMC + i)))
             return hm2_diag_add(diag, HM2_ERR_IO, "cannot watch a socket: %s", strerror(errno));
     }
     return 0;
@@ -135,7 +137,7 @@ static void print_ready(const struct program *const p)
     fflush(stdout);
 }
 
-static void print_stats(const struct program *const p)
+static void print_stats(struct program *const p)
 {
     for (unsigned i = 0; i < p->count; i++)
         station_print_stats(&p->stations[i]);
@@ -199,6 +201,8 @@ static void on_event(struct program *const p, const uint32_t source)
     default:
         if (source < SOURCE_SIGNAL)
             station_receive(&p->stations[source], now_ns(p));
+        else if (source < SOURCE_SERIAL)
+            station_receive_ppmc(&p->stations[source - SOURCE_PPMC], now_ns(p));
         else
             serial_receive(&p->serials[source - SOURCE_SERIAL], now_ns(p));
         break;

@@ -488,6 +488,7 @@ enum {
     OPT_INDEX,
     OPT_UART,
     OPT_SERVO_CARD,
+    OPT_PPMC,
     OPT_SWITCH,
     OPT_DRIVE,
     OPT_REMOTE,
@@ -522,6 +523,7 @@ static const struct option long_options[] = {
     {"index", required_argument, NULL, OPT_INDEX},
     {"uart", required_argument, NULL, OPT_UART},
     {"7i65", required_argument, NULL, OPT_SERVO_CARD},
+    {"ppmc", required_argument, NULL, OPT_PPMC},
     {"switch", required_argument, NULL, OPT_SWITCH},
     {"drive", required_argument, NULL, OPT_DRIVE},
     {"remote", required_argument, NULL, OPT_REMOTE},
@@ -582,6 +584,7 @@ static void print_help(void)
           "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
           "  --uart PORT:TARGET  at uart.N or pktuart.N: loop, or the path of a terminal to make\n"
           "  --7i65 PORT         a 7I65 with axes at a buffered SPI port\n"
+          "  --ppmc PATH         Pico Systems encoder boards on a socket; they count the step generators' steps\n"
           "  --switch IO:AXIS:POSITION:LEVELS  below the position of stepgen.N or encoder.N one level, then another\n"
           "  --drive IO:LEVELS[:MS]  0, 1, z (floating), h (pulled up), MS milliseconds each\n"
           "  --remote PORT:CHANNEL=CARD  a smart-serial card there. Cards:",
@@ -675,6 +678,9 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_uart(r, value);
     case OPT_SERVO_CARD:
         return set_servo_card(r, value);
+    case OPT_PPMC:
+        r->card->ppmc = value;
+        return 0;
     case OPT_SWITCH:
         return add_switch(r, value);
     case OPT_REMOTE:

@@ -100,6 +100,7 @@ struct card_options {
     struct uart_option uarts[MAX_UARTS];
     bool has_servo_card; /* a 7I65 at a buffered SPI port */
     unsigned servo_port;
+    const char *ppmc; /* path of the socket of its EPP bus */
 };
 
 /* A remote of one processor on a pseudo-terminal. */

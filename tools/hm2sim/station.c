@@ -15,7 +15,7 @@
 #define MAX_FIRMWARE_BYTES (1u << 20)
 #define PEER_STEP_NS       1000000
 #define WIRED_STEP_NS \
-    5000000 /* edges on wires and of switches are made at least this often, not all at the next packet */
+    5000000 /* edges on wires, of switches and of shafts are made at least this often, not all at the next packet */
 
 /* ---- clients ------------------------------------------------------------------------------------------------------
  */
@@ -86,6 +86,13 @@ void station_run(struct station *const s, const int64_t now_ns)
     sim_net_sleep_until(s->net, now_ns);
     press_switches(s, now_ns);
     peers_run(&s->peers, now_ns);
+    ppmc_turn(&s->ppmc, now_ns);
+}
+
+void station_receive_ppmc(struct station *const s, const int64_t now_ns)
+{
+    station_run(s, now_ns);
+    ppmc_receive(&s->ppmc);
 }
 
 int64_t station_next_ns(const struct station *const s)
@@ -94,7 +101,7 @@ int64_t station_next_ns(const struct station *const s)
     for (unsigned i = 0; i < s->options->pattern_count; i++)
         if (s->pattern_due_ns[i] < next_ns)
             next_ns = s->pattern_due_ns[i];
-    if (s->options->wire_count > 0 || s->options->switch_count > 0) {
+    if (s->options->wire_count > 0 || s->options->switch_count > 0 || s->options->ppmc) {
         const int64_t step_ns = link_now_ns(sim_net_link(s->net)) + WIRED_STEP_NS;
         next_ns = step_ns < next_ns ? step_ns : next_ns;
     }
@@ -195,6 +202,8 @@ int station_open(struct station *const s, const struct options *const options, c
         err = axes_connect(&s->axes, card, s->card, diag);
     if (!err)
         err = peers_connect(&s->peers, card, s->card, diag);
+    if (!err && card->ppmc)
+        err = ppmc_open(&s->ppmc, s->card, card->ppmc, diag);
     if (!err)
         err = open_socket(card->address, card->port, &s->socket, &s->address, diag);
     if (!err)
@@ -213,6 +222,7 @@ void station_close(struct station *const s)
     if (s->foreign_socket >= 0)
         close(s->foreign_socket);
     peers_close(&s->peers);
+    ppmc_close(&s->ppmc);
     sim_net_free(s->net);
     sim_card_free(s->card);
     flash_close(&s->flash);
@@ -228,7 +238,7 @@ void station_name(const struct station *const s, char name[const STATION_NAME_SI
     snprintf(name, STATION_NAME_SIZE, "%s@%s:%u", s->options->type, address, ntohs(s->address.sin_port));
 }
 
-void station_print_stats(const struct station *const s)
+void station_print_stats(struct station *const s)
 {
     char name[STATION_NAME_SIZE];
     const struct sim_net_truth t = sim_net_truth(s->net);
@@ -248,4 +258,5 @@ void station_print_stats(const struct station *const s)
         printf("%s: unheard while frozen %" PRIu64 "\n", name, t.unheard);
     axes_print(&s->axes, name);
     peers_print(&s->peers, name);
+    ppmc_print(&s->ppmc, name);
 }

@@ -5,6 +5,7 @@
 
 #include "axes.h"
 #include "peers.h"
+#include "ppmc.h"
 
 struct station {
     const struct card_options *options;
@@ -12,6 +13,7 @@ struct station {
     struct axes axes;
     struct flash_file flash;
     struct peers peers;
+    struct ppmc_bus ppmc;
     struct sim_net *net;
     int socket, foreign_socket; /* -1 = not open */
     struct sockaddr_in address;
@@ -27,6 +29,8 @@ void station_close(struct station *station);
 
 /* Take one datagram from the socket. */
 void station_receive(struct station *station, int64_t now_ns);
+/* Answer who asks its EPP bus. */
+void station_receive_ppmc(struct station *station, int64_t now_ns);
 /* Do what is due. */
 void station_run(struct station *station, int64_t now_ns);
 /* When something will be; INT64_MAX = nothing. */
@@ -35,6 +39,6 @@ int64_t station_next_ns(const struct station *station);
 /* "7i96s@127.0.0.1:27181" */
 #define STATION_NAME_SIZE 64u
 void station_name(const struct station *station, char name[STATION_NAME_SIZE]);
-void station_print_stats(const struct station *station);
+void station_print_stats(struct station *station);
 
 #endif

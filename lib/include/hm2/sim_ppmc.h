@@ -63,6 +63,18 @@ HM2_API struct epp *sim_ppmc_epp(struct sim_ppmc *bus);
  * EPP_WIRE_MAX_BYTES; 0 = no request, the client is to be sent away. */
 HM2_API size_t sim_ppmc_serve(struct sim_ppmc *bus, const uint8_t *request, size_t len, uint8_t *reply);
 
+/* The bus on a socket of this path, for up to eight processes at a time (epp_open(): sim:PATH). A socket that a killed
+ * program left there is replaced. HM2_ERR_INVALID for a path that is too long, HM2_ERR_IO with the system's reason.
+ * Closing removes the socket. */
+struct sim_ppmc_server;
+HM2_API int HM2_MUST_CHECK sim_ppmc_server_open(struct sim_ppmc_server **server, const char *path,
+                                                struct hm2_diag *diag);
+HM2_API void sim_ppmc_server_close(struct sim_ppmc_server *server);
+/* A descriptor that is readable (poll(2), epoll(7)) when somebody connects or asks something. */
+HM2_API int sim_ppmc_server_fd(const struct sim_ppmc_server *server);
+/* Take what has come and answer it, at the bus's present time: call sim_ppmc_set_time() before. Does not wait. */
+HM2_API void sim_ppmc_server_run(struct sim_ppmc_server *server, struct sim_ppmc *bus);
+
 /* A parallel port in front of the bus, as an x86 sees it: registers B+0..B+7 and the ECR at B+0x402 (ppmc.md section
  * 3.3). Other offsets read as 0xFF. */
 HM2_API uint8_t sim_ppmc_port_in(struct sim_ppmc *bus, unsigned offset);
