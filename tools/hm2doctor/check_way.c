@@ -1,0 +1,192 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* The way to the card: route, neighbours, filters. */
+#include <arpa/inet.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "doctor.h"
+
+#define LOOPBACK_NET 127u
+
+/* A line of /proc/net/route; addresses and mask are in network order, printed as a number of this machine. */
+struct route {
+    char interface[INTERFACE_BYTES];
+    uint32_t to, gateway, mask;
+};
+
+static bool hexadecimal(const char *const word, uint32_t *const value)
+{
+    char *end;
+    const unsigned long number = strtoul(word, &end, 16);
+    *value = ntohl((uint32_t)number);
+    return end != word && *end == '\0' && number <= UINT32_MAX;
+}
+
+static bool parse_route(const char *const line, struct route *const route)
+{
+    char to[9], gateway[9], mask[9];
+    return sscanf(line, "%15s %8s %8s %*s %*s %*s %*s %8s", route->interface, to, gateway, mask) == 4 &&
+           hexadecimal(to, &route->to) && hexadecimal(gateway, &route->gateway) && hexadecimal(mask, &route->mask);
+}
+
+static const char *next_line(const char *const at)
+{
+    const char *const end = strchr(at, '\n');
+    return end ? end + 1 : NULL;
+}
+
+static bool routes(struct patient *const p, char *const text, const size_t cap)
+{
+    return state_text(p->state, text, cap, "proc/net/route");
+}
+
+/* The route with the longest mask that the card's address matches. */
+static bool best_route(const char *const text, const uint32_t card, struct route *const best)
+{
+    bool found = false;
+    for (const char *line = next_line(text); line; line = next_line(line)) {
+        struct route route;
+        if (parse_route(line, &route) && (card & route.mask) == route.to && (!found || route.mask > best->mask)) {
+            *best = route;
+            found = true;
+        }
+    }
+    return found;
+}
+
+bool find_interface(struct patient *const p)
+{
+    static char text[STATE_TEXT_BYTES];
+    struct route route;
+    if (p->card >> 24 == LOOPBACK_NET) {
+        snprintf(p->interface, sizeof p->interface, "lo");
+        return true;
+    }
+    if (!routes(p, text, sizeof text) || !best_route(text, p->card, &route))
+        return false;
+    memcpy(p->interface, route.interface, sizeof p->interface);
+    return true;
+}
+
+static void card_text(const uint32_t card, char text[INET_ADDRSTRLEN])
+{
+    const struct in_addr address = {.s_addr = htonl(card)};
+    inet_ntop(AF_INET, &address, text, INET_ADDRSTRLEN);
+}
+
+static void check_route(struct patient *const p)
+{
+    static char text[STATE_TEXT_BYTES];
+    char card[INET_ADDRSTRLEN];
+    struct route route = {.mask = 0};
+    card_text(p->card, card);
+    if (!routes(p, text, sizeof text) || !best_route(text, p->card, &route)) {
+        remedy(find(p->findings, "route", GRADE_FAULT, "there is no way to %s", card), false,
+               "ip addr add %u.%u.%u.1/24 dev INTERFACE (the one with the card's cable)", p->card >> 24,
+               p->card >> 16 & 255, p->card >> 8 & 255);
+        return;
+    }
+    if (route.gateway != 0)
+        remedy(find(p->findings, "route", GRADE_FAULT,
+                    "%s is reached through a gateway by %s; the card answers to its own "
+                    "network only",
+                    card, route.interface),
+               false, "ip addr add %u.%u.%u.1/24 dev INTERFACE (the one with the card's cable)", p->card >> 24,
+               p->card >> 16 & 255, p->card >> 8 & 255);
+    else
+        find(p->findings, "route", GRADE_OK, "%s is reached directly by %s", card, route.interface);
+}
+
+/* A network port that leads elsewhere, too, has other packets in the way. */
+static void check_sharing(struct patient *const p)
+{
+    static char text[STATE_TEXT_BYTES];
+    if (!routes(p, text, sizeof text))
+        return;
+    for (const char *line = next_line(text); line; line = next_line(line)) {
+        struct route route;
+        if (parse_route(line, &route) && route.mask == 0 && strcmp(route.interface, p->interface) == 0) {
+            remedy(find(p->findings, "sharing", GRADE_ADVICE, "%s also leads to everything else (default route)",
+                        p->interface),
+                   false, "give the card a network port of its own");
+            return;
+        }
+    }
+    find(p->findings, "sharing", GRADE_OK, "%s leads to nothing else by default", p->interface);
+}
+
+static void check_neighbour(struct patient *const p)
+{
+    static char text[STATE_TEXT_BYTES];
+    char card[INET_ADDRSTRLEN], flags[8], mac[20];
+    card_text(p->card, card);
+    if (!state_text(p->state, text, sizeof text, "proc/net/arp"))
+        return;
+    for (const char *line = next_line(text); line; line = next_line(line)) {
+        char address[INET_ADDRSTRLEN];
+        if (sscanf(line, "%15s %*s %7s %19s", address, flags, mac) != 3 || strcmp(address, card) != 0)
+            continue;
+        const unsigned long state = strtoul(flags, NULL, 16);
+        if (state == 0)
+            remedy(find(p->findings, "arp", GRADE_FAULT, "%s does not answer to ARP", card), false,
+                   "check cable, power and the address jumpers of the card");
+        else if (strncmp(mac, "00:60:1b:", 9) != 0)
+            remedy(find(p->findings, "arp", GRADE_ADVICE,
+                        "%s is %s, which is no MAC address of Mesa: another device may "
+                        "have the card's address",
+                        card, mac),
+                   false, "arping -D -I %s %s (two answers are two devices)", p->interface, card);
+        else
+            find(p->findings, "arp", GRADE_OK, "%s is %s%s", card, mac, state & 4 ? ", pinned" : "");
+        return;
+    }
+}
+
+static void check_reverse_path(struct patient *const p)
+{
+    long long all = 0, own = 0;
+    if (!state_number(p->state, &own, "proc/sys/net/ipv4/conf/%s/rp_filter", p->interface))
+        return;
+    (void)state_number(p->state, &all, "proc/sys/net/ipv4/conf/all/rp_filter");
+    if (all == 1 || own == 1)
+        remedy(find(p->findings, "rp_filter", GRADE_ADVICE,
+                    "replies that come by another port than the route says are "
+                    "dropped without a word (rp_filter 1)"),
+               true, "sysctl -w net.ipv4.conf.all.rp_filter=2 net.ipv4.conf.%s.rp_filter=2", p->interface);
+    else
+        find(p->findings, "rp_filter", GRADE_OK, "replies are not filtered by their way");
+}
+
+/* A base chain of the way in or out that drops what no rule lets through. */
+static void check_firewall(struct patient *const p)
+{
+    static char text[STATE_TEXT_BYTES];
+    if (!state_text(p->state, text, sizeof text, "doctor/firewall")) {
+        find(p->findings, "firewall", GRADE_UNKNOWN, "the firewall's rules are shown to root only");
+        return;
+    }
+    for (const char *line = text; line; line = next_line(line)) {
+        char copy[160];
+        const size_t len = strcspn(line, "\n");
+        snprintf(copy, sizeof copy, "%.*s", len < sizeof copy ? (int)len : (int)sizeof copy - 1, line);
+        if ((strstr(copy, "hook input") || strstr(copy, "hook output")) && strstr(copy, "policy drop")) {
+            remedy(find(p->findings, "firewall", GRADE_ADVICE, "the firewall drops what no rule lets through (%s)",
+                        strstr(copy, "hook input") ? "input" : "output"),
+                   false, "let UDP port 27181 of the card through");
+            return;
+        }
+    }
+    find(p->findings, "firewall", GRADE_OK, "the firewall lets packets through unless a rule says otherwise");
+}
+
+void check_way(struct patient *const p)
+{
+    if (p->card >> 24 != LOOPBACK_NET)
+        check_route(p);
+    if (p->interface[0] && strcmp(p->interface, "lo") != 0) {
+        check_sharing(p);
+        check_neighbour(p);
+        check_reverse_path(p);
+    }
+    check_firewall(p);
+}
