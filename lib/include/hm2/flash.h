@@ -185,7 +185,8 @@ struct flash_survey {
 HM2_API int HM2_MUST_CHECK flash_card_survey(struct flash_card *card, struct flash_survey *survey,
                                              struct hm2_diag *diag);
 /* Refuse (HM2_ERR_STATE) when somebody else talks to the card: packet counters that move by themselves for 100 ms, or a
- * signature in its scratch register that does not stay (H10, H11). */
+ * signature in its scratch register that does not stay (H10, H11). Takes 100 ms, and nothing when it was found a second
+ * ago and nobody has turned up since. */
 HM2_API int HM2_MUST_CHECK flash_card_quiet(struct flash_card *card, struct hm2_diag *diag);
 /* Number of I/O pins that are outputs now (H19); negative = error. */
 HM2_API int HM2_MUST_CHECK flash_card_outputs(struct flash_card *card, struct hm2_diag *diag);
