@@ -133,6 +133,9 @@ START_TEST(backs_up_and_restores)
     printed("Checksum file '");
     run(REFUSED, "--device", "7i93", "--addr", address, "--backup-flash", dump);
     printed("already exist");
+    ck_assert_ptr_null(strstr(tool.text, "Reading")); /* found out before the chip is read */
+    run(FAILED, "--device", "7i93", "--addr", address, "--backup-flash", "/proc/dump.bin");
+    ck_assert_ptr_null(strstr(tool.text, "Reading"));
     run(DONE, "--device", "7i93", "--addr", address, "--write", image);
     run(DONE, "--device", "7i93", "--addr", address, "--restore-flash", dump);
     printed("Backup file integrity verification passed\n");
@@ -304,6 +307,31 @@ START_TEST(tells_the_way_back_from_a_stored_address)
 }
 END_TEST
 
+/* H14: what is network and broadcast depends on the card's own mask. */
+START_TEST(judges_addresses_by_the_cards_mask)
+{
+    const char *const address = sim.address[0];
+    static const struct {
+        int status;
+        const char *setting;
+    } rows[] = {{DONE, "netmask=255.255.254.0"},
+                {DONE, "ip=10.0.0.255"},
+                {DONE, "ip=10.0.1.0"},
+                {REFUSED, "ip=10.0.0.0"},
+                {REFUSED, "ip=10.0.1.255"},
+                {REFUSED, "netmask=255.255.255.0"},
+                {DONE, "ip=10.0.1.6"},
+                {DONE, "netmask=255.255.255.0"},
+                {REFUSED, "ip=10.0.0.255"},
+                {DONE, "netmask=255.255.255.248"},
+                {REFUSED, "ip=10.0.1.8"},
+                {REFUSED, "ip=10.0.1.15"},
+                {DONE, "ip=10.0.1.9"}};
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        run(rows[i].status, "--addr", address, "--set", rows[i].setting, "--any-traffic");
+}
+END_TEST
+
 START_TEST(prints_daughter_boards_in_capitals)
 {
     run(DONE, "--addr", sim.address[1], "--readhmid", "--dbname1", "7i77");
@@ -381,6 +409,7 @@ int main(void)
     tcase_add_test(tests, backs_up_before_the_fallback_image_is_replaced);
     tcase_add_test(tests, shows_what_is_wrong_with_the_boot_block);
     tcase_add_test(tests, tells_the_way_back_from_a_stored_address);
+    tcase_add_test(tests, judges_addresses_by_the_cards_mask);
     tcase_add_test(tests, prints_daughter_boards_in_capitals);
     tcase_add_test(tests, refuses_a_file_that_its_check_sum_does_not_fit);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
