@@ -340,6 +340,25 @@ START_TEST(prints_daughter_boards_in_capitals)
 }
 END_TEST
 
+/* H15: each command that has to do with the flash says which of two chips it is about. */
+START_TEST(reminds_of_the_second_chip)
+{
+    static const char words[] = "the 7I76E has two flash chips, and this concerns only the one that jumper W9 chooses";
+    const char *const image = flash_rig_image("7i76e_a.bit", &(struct sim_flash_file){.profile = "7i76e", .seed = 1});
+    const char *const dump = flash_rig_path("dump.bin");
+    simulator_stop(&sim);
+    simulator_start(&sim, (const char *const[]){"--card", "7i76e", NULL});
+    const char *const commands[][2] = {
+        {"--write", image}, {"--verify", image}, {"--backup-flash", dump}, {"--restore-flash", dump}};
+    for (unsigned i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        run(DONE, "--device", "7i76e", "--addr", sim.address[0], commands[i][0], commands[i][1]);
+        printed(words);
+    }
+    run(DONE, "--device", "7i76e", "--addr", sim.address[0]);
+    ck_assert_ptr_null(strstr(tool.text, "two flash chips"));
+}
+END_TEST
+
 /* H18: a check sum beside the file counts without being asked for, and the file's own is printed. */
 START_TEST(refuses_a_file_that_its_check_sum_does_not_fit)
 {
@@ -411,6 +430,7 @@ int main(void)
     tcase_add_test(tests, tells_the_way_back_from_a_stored_address);
     tcase_add_test(tests, judges_addresses_by_the_cards_mask);
     tcase_add_test(tests, prints_daughter_boards_in_capitals);
+    tcase_add_test(tests, reminds_of_the_second_chip);
     tcase_add_test(tests, refuses_a_file_that_its_check_sum_does_not_fit);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
