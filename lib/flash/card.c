@@ -13,6 +13,7 @@
 #define FIRST_TRIES    5u /* 2.5 s */
 #define QUIET_NS       INT64_C(100000000)
 #define QUIET_ROUNDS   3u
+#define QUIET_FOR_NS   INT64_C(1000000000)
 
 int flash_lost(struct hm2_diag *const diag, const int err, const char *const what)
 {
@@ -254,22 +255,35 @@ static int look(struct flash_card *const card, struct hm2_diag *const diag)
     return err < 0 ? flash_lost(diag, err, "looking at its packet counters") : 0;
 }
 
+static bool nobody_since(const struct flash_card *const card, const uint64_t foreign, const uint64_t intruders)
+{
+    return card->port.counters.foreign == foreign && card->port.intruders == intruders;
+}
+
 /* A driver sends in every round; a datagram that the network repeated does so once. */
 int flash_card_quiet(struct flash_card *const card, struct hm2_diag *const diag)
 {
+    struct flash_port *const port = &card->port;
     uint64_t heard = 0;
+    if (link_now_ns(port->link) < card->quiet_until_ns &&
+        nobody_since(card, card->quiet_foreign, card->quiet_intruders))
+        return 0;
     for (unsigned i = 0; i < QUIET_ROUNDS; i++) {
         int err = look(card, diag);
         if (err < 0)
             return err;
-        const uint64_t foreign = card->port.counters.foreign, intruders = card->port.intruders;
-        flash_port_wait(&card->port, QUIET_NS);
+        const uint64_t foreign = port->counters.foreign, intruders = port->intruders;
+        flash_port_wait(port, QUIET_NS);
         err = look(card, diag);
         if (err < 0)
             return err;
-        if (card->port.counters.foreign == foreign && card->port.intruders == intruders)
+        if (nobody_since(card, foreign, intruders)) {
+            card->quiet_foreign = foreign;
+            card->quiet_intruders = intruders;
+            card->quiet_until_ns = link_now_ns(port->link) + QUIET_FOR_NS;
             return 0;
-        heard += card->port.counters.foreign - foreign;
+        }
+        heard += port->counters.foreign - foreign;
     }
     return hm2_diag_add(diag, HM2_ERR_STATE,
                         "another program talks to this card (%llu datagrams in %u ms%s). Stop LinuxCNC, hm2host or the "

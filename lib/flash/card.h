@@ -15,6 +15,8 @@ struct flash_card {
     struct flash_port port;
     struct flash_card_info info;
     struct flash_range writable; /* what the present job may change; empty = nothing */
+    int64_t quiet_until_ns;      /* nobody else talked to the card a moment ago, which is believed until then */
+    uint64_t quiet_foreign, quiet_intruders; /* ... unless these counters have moved */
 };
 
 /* "the card at ... was lost" with what to do next; returns err. */

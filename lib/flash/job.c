@@ -137,10 +137,14 @@ static void start(struct flash_job *const job, const enum job_state state)
     job_enter(job, state);
 }
 
+/* First of all nobody else may be using the card: reading the flash moves the address register, and the erase of a
+ * program that sends address and erase apart would go to where this one reads (H1, H11). */
 static int look_at_flash(struct flash_job *const job, struct flash_survey *const survey, struct hm2_diag *const diag)
 {
     struct flash_survey again;
-    int err = flash_card_survey(job->card, survey, diag);
+    int err = job->options.any_traffic ? 0 : flash_card_quiet(job->card, diag);
+    if (err == 0)
+        err = flash_card_survey(job->card, survey, diag);
     if (err == 0)
         err = flash_card_survey(job->card, &again, diag);
     if (err == 0 && memcmp(survey, &again, sizeof again) != 0)
@@ -184,8 +188,6 @@ static int prepare_write(struct flash_job *const job, const struct flash_image *
     int err = look_at_flash(job, &survey, diag);
     if (err == 0)
         err = flash_check_content(card, &survey, &job->options, diag);
-    if (err == 0 && !job->options.any_traffic)
-        err = flash_card_quiet(card, diag);
     if (err < 0)
         return err;
     const bool fallback = job->options.area == FLASH_FALLBACK;
@@ -290,8 +292,6 @@ static int prepare_restore(struct flash_job *const job, const uint8_t *const dum
 {
     struct flash_survey survey;
     int err = look_at_flash(job, &survey, diag);
-    if (err == 0 && !job->options.any_traffic)
-        err = flash_card_quiet(job->card, diag);
     if (err < 0)
         return err;
     const bool fallback_first = flash_can_start(survey.user) && !flash_can_start(survey.fallback);

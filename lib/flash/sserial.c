@@ -1,107 +1,120 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Who is at the smart-serial ports: set-up through the command and data registers (flash tool reference 3.18). The pins
- * are given to the ports for as long as it takes, everything else is left as it is.
+ * Who is at the smart-serial ports (flash tool reference 3.18). The pins are given to the ports for as long as it
+ * takes, everything else is left as it is.
  */
 #include "card.h"
 
-enum { REG_COMMAND, REG_DATA, REG_CHANNEL_STATUS, REG_INTERFACE_0, REG_INTERFACE_1 };
 enum { PORT_DDR = 1, PORT_ALTERNATE = 2 };
-enum { LOCAL_TYPE, LOCAL_WIDTH, LOCAL_MAJOR, LOCAL_MINOR, LOCAL_START, LOCAL_STRIDE, LOCAL_PROCESSOR, LOCAL_CHANNELS };
 
-#define COMMAND_RESET 0x4800u
-#define COMMAND_STOP  0x0800u
-#define COMMAND_SETUP 0x0F00u
-#define COMMAND_LOCAL 0x2000u
-#define BAUD_OFFSET   42u
-#define PORT_BYTES    0x40u
-#define CHANNEL_BYTES 4u
-#define DONE_NS       INT64_C(300000000)
-#define POLL_NS       INT64_C(1000000)
-#define MOST_PORTS    8u
+#define LOCAL_FACTS 8u
+#define LOCAL_CLOCK 0x230u
+#define BAUD_OFFSET 42u
+#define WIDEST      64u
+#define MOST_PORTS  8u
 
-struct port {
-    struct flash_card *card;
-    uint16_t base;
-};
-
-static uint16_t address(const struct port *const port, const unsigned reg, const unsigned channel)
+static int bus_read(void *const access, const uint16_t address, const unsigned words, uint32_t *const values)
 {
-    return (uint16_t)(port->base + 0x100u * reg + CHANNEL_BYTES * channel);
+    struct hm2_diag ignored = {0};
+    return flash_card_read_hm2(access, address, words, values, &ignored);
 }
 
-static int command(const struct port *const port, const uint32_t word, struct hm2_diag *const diag)
+static int bus_write(void *const access, const uint16_t address, const unsigned words, const uint32_t *const values)
 {
-    struct link *const link = port->card->port.link;
-    const int64_t end_ns = link_now_ns(link) + DONE_NS;
-    uint32_t left = 1;
-    int err = flash_card_write_hm2(port->card, address(port, REG_COMMAND, 0), 1, &word, diag);
-    while (err == 0) {
-        err = flash_card_read_hm2(port->card, address(port, REG_COMMAND, 0), 1, &left, diag);
-        if (err < 0 || left == 0)
-            return err;
-        if (link_now_ns(link) > end_ns)
-            return hm2_diag_add(diag, HM2_ERR_UNSUPPORTED,
-                                "the smart-serial port at 0x%04X does not carry out command 0x%04X", port->base,
-                                (unsigned)word);
-        flash_port_wait(&port->card->port, POLL_NS);
-    }
-    return err;
+    struct hm2_diag ignored = {0};
+    return flash_card_write_hm2(access, address, words, values, &ignored);
 }
 
-static int local(const struct port *const port, const unsigned at, uint8_t *const value, struct hm2_diag *const diag)
+static int64_t bus_now_ns(void *const access)
 {
-    uint32_t word = 0;
-    int err = command(port, COMMAND_LOCAL + at, diag);
-    if (err == 0)
-        err = flash_card_read_hm2(port->card, address(port, REG_DATA, 0), 1, &word, diag);
-    *value = (uint8_t)word;
-    return err;
+    const struct flash_card *const card = access;
+    return link_now_ns(card->port.link);
 }
 
-static int describe_port(const struct port *const port, struct flash_sserial *const out, struct hm2_diag *const diag)
+static int local_word(const struct sslbp_port *const port, const unsigned at, uint32_t *const value)
 {
-    uint8_t bytes[LOCAL_CHANNELS + 1] = {0};
-    int err = command(port, COMMAND_RESET, diag);
-    if (err == 0)
-        err = command(port, COMMAND_STOP, diag);
-    for (unsigned i = 0; i <= LOCAL_CHANNELS && err == 0; i++)
-        err = local(port, i, &bytes[i], diag);
-    out->type = bytes[LOCAL_TYPE];
-    out->width = bytes[LOCAL_WIDTH];
-    out->major = bytes[LOCAL_MAJOR];
-    out->minor = bytes[LOCAL_MINOR];
-    out->processor = bytes[LOCAL_PROCESSOR];
-    out->channels = bytes[LOCAL_CHANNELS] < FLASH_SSERIAL_CHANNELS ? bytes[LOCAL_CHANNELS] : FLASH_SSERIAL_CHANNELS;
+    int err = 0;
+    *value = 0;
     for (unsigned i = 0; i < 4 && err == 0; i++) {
-        uint8_t byte;
-        err = local(port, bytes[LOCAL_START] + BAUD_OFFSET + i, &byte, diag);
-        out->baud |= err == 0 ? (uint32_t)byte << 8 * i : 0;
+        uint8_t byte = 0;
+        err = sslbp_local_read(port, (uint16_t)(at + i), &byte);
+        *value |= (uint32_t)byte << 8 * i;
     }
     return err;
 }
 
-static int describe_remote(const struct port *const port, const unsigned channel, struct flash_sserial *const out,
-                           struct hm2_diag *const diag)
+static int describe_port(const struct sslbp_port *const port, struct flash_sserial *const out)
 {
-    const uint32_t normal = 0;
-    uint32_t failed = 1, words[2] = {0, 0};
-    int err = flash_card_write_hm2(port->card, address(port, REG_CHANNEL_STATUS, channel), 1, &normal, diag);
+    uint8_t *const facts[LOCAL_FACTS] = {&out->type,  &out->width,  &out->major,     &out->minor,
+                                         &out->first, &out->stride, &out->processor, &out->channels};
+    int err = 0;
+    for (unsigned i = 0; i < LOCAL_FACTS && err == 0; i++)
+        err = sslbp_local_read(port, (uint16_t)i, facts[i]);
     if (err == 0)
-        err = command(port, COMMAND_SETUP | 1u << channel, diag);
+        err = local_word(port, out->first + BAUD_OFFSET, &out->baud);
+    return err == 0 ? local_word(port, LOCAL_CLOCK, &out->clock_hz) : err;
+}
+
+/* ---- remotes ---------------------------------------------------------------------------------------------------- */
+
+static int read_value(const struct sslbp_port *const port, struct flash_remote *const remote, const unsigned index)
+{
+    const struct sslbp_field *const field = &remote->tables.global[index];
+    const bool guarded = sslbp_is_nonvolatile(field);
+    int err = 0;
+    if (field->bits == 0 || field->bits > WIDEST)
+        return 0;
+    if (guarded)
+        err = sslbp_nonvolatile(port, remote->channel, true);
     if (err == 0)
-        err = flash_card_read_hm2(port->card, address(port, REG_DATA, 0), 1, &failed, diag);
-    if (err < 0 || failed)
+        err =
+            sslbp_remote_read(port, remote->channel, field->address, sslbp_field_bytes(field), &remote->values[index]);
+    remote->known[index] = err == 0;
+    const int closed = guarded ? sslbp_nonvolatile(port, remote->channel, false) : 0;
+    return err < 0 ? err : closed;
+}
+
+static int describe_remote(const struct sslbp_port *const port, struct flash_remote *const remote)
+{
+    const uint8_t modes[SSLBP_CHANNELS] = {0};
+    struct sslbp_identity identity = {0};
+    unsigned failed = 0;
+    int err = sslbp_port_start(port, 1u << remote->channel, true, modes, &failed);
+    if (err == 0 && failed)
+        err = hm2_diag_add(port->diag, HM2_ERR_IO, "%s, channel %u: the remote does not enter set-up mode", port->name,
+                           remote->channel);
+    if (err == 0)
+        err = sslbp_identify(port, remote->channel, &identity);
+    if (err < 0)
         return err;
-    for (unsigned i = 0; i < 2 && err == 0; i++)
-        err = flash_card_read_hm2(port->card, address(port, REG_INTERFACE_0 + i, channel), 1, &words[i], diag);
-    out->present[channel] = err == 0;
-    out->unit[channel] = words[0];
+    remote->unit = identity.unit;
     for (unsigned i = 0; i < 4; i++) {
-        const char c = (char)(words[1] >> 8 * i);
-        out->name[channel][i] = c;
+        const char c = (char)(identity.name >> 8 * i);
+        remote->name[i] = c;
         if (c && (c < ' ' || c > '~'))
-            out->name[channel][i] = '?';
+            remote->name[i] = '?';
+    }
+    err = sslbp_list(port, remote->channel, &identity, remote->name, &remote->tables);
+    for (unsigned i = 0; i < remote->tables.global_count && err == 0; i++)
+        err = read_value(port, remote, i);
+    return err;
+}
+
+/* A set-up START waits for ever on an empty channel (traces): a normal one, which gives up, tells who is there. */
+static int ask_remotes(const struct sslbp_port *const port, const struct flash_sserial *const facts,
+                       const flash_sserial_fn each, void *const context)
+{
+    const uint8_t modes[SSLBP_CHANNELS] = {0};
+    const unsigned all = (1u << port->channels) - 1u;
+    unsigned failed = 0;
+    int err = sslbp_port_start(port, all, false, modes, &failed);
+    for (unsigned channel = 0; channel < port->channels && err == 0; channel++) {
+        if (failed >> channel & 1u)
+            continue;
+        struct flash_remote remote = {.channel = channel};
+        err = describe_remote(port, &remote);
+        if (err == 0)
+            each(context, facts, &remote);
     }
     return err;
 }
@@ -160,13 +173,29 @@ static int return_pins(struct flash_card *const card, const struct pins *const p
     return err;
 }
 
-int flash_card_sserial(struct flash_card *const card, const unsigned index, struct flash_sserial *const out,
-                       struct hm2_diag *const diag)
+static int ask(struct sslbp_port *const port, const flash_sserial_fn each, void *const context)
+{
+    struct flash_sserial facts = {0};
+    int err = sslbp_port_open(port);
+    if (err < 0)
+        return err;
+    err = describe_port(port, &facts);
+    if (err == 0) {
+        each(context, &facts, NULL);
+        err = ask_remotes(port, &facts, each, context);
+    } else {
+        err = hm2_diag_add(port->diag, err, "%s: its local parameters cannot be read", port->name);
+    }
+    const int stopped = sslbp_port_stop(port);
+    return err < 0 ? err : stopped;
+}
+
+int flash_card_sserial(struct flash_card *const card, const unsigned index, const flash_sserial_fn each,
+                       void *const context, struct hm2_diag *const diag)
 {
     struct hm2_idrom rom;
     struct hm2_diag ignored = {0};
     struct pins pins = {0};
-    *out = (struct flash_sserial){0};
     if (card->info.cookie != HM2_COOKIE || hm2_idrom_parse(&card->info.image, NULL, &rom, &ignored) != 0)
         return HM2_ERR_NOTFOUND;
     const struct hm2_md *md = hm2_idrom_find(&rom, HM2_GTAG_SSERIAL);
@@ -174,12 +203,12 @@ int flash_card_sserial(struct flash_card *const card, const unsigned index, stru
         md = hm2_idrom_find(&rom, HM2_GTAG_SSERIALB);
     if (!md || index >= md->instances)
         return HM2_ERR_NOTFOUND;
-    const struct port port = {card, (uint16_t)(md->base + PORT_BYTES * index)};
+    struct sslbp_port port = {
+        .bus = {card, bus_read, bus_write, bus_now_ns}, .name = "the card's smart-serial port", .diag = diag};
+    sslbp_port_place(&port, md, index);
     int err = lend_pins(card, &rom, md->gtag, &pins, diag);
     if (err == 0)
-        err = describe_port(&port, out, diag);
-    for (unsigned i = 0; i < out->channels && err == 0; i++)
-        err = describe_remote(&port, i, out, diag);
+        err = ask(&port, each, context);
     const int back = return_pins(card, &pins, diag);
     return err < 0 ? err : back;
 }

@@ -166,6 +166,19 @@ static const struct sim_firmware firmware_7i80hd = {
     .module_count = ROWS(modules_7i80hd),
 };
 
+/* A 7I76E with nothing but its I/O: what real firmware has besides comes with hm2sim's --firmware. */
+static const struct sim_firmware firmware_7i76e = {
+    .board_name = "MESA7I76",
+    .fpga_size = 16,
+    .fpga_pins = 256,
+    .io_ports = 3,
+    .port_width = 17,
+    .clock_low_hz = 100000000,
+    .clock_high_hz = 200000000,
+    .modules = modules_7i80hd,
+    .module_count = ROWS(modules_7i80hd),
+};
+
 /* Addresses: jumpers down/down are 192.168.1.121, the EEPROM ships with 10.10.10.10 (seed 000, "IP ADDRESS"). */
 static const struct sim_profile profiles[] = {
     {
@@ -220,9 +233,22 @@ static const struct sim_profile profiles[] = {
         .idcode = 0x04002093,
         .firmware = &firmware_7i80hd,
     },
+    {
+        .name = "7i76e",
+        .card_name = "7I76E-16",
+        .lbp_version = 3,
+        .firmware_version = 16,
+        .ip = {192, 168, 1, 121},
+        .eeprom_ip = {10, 10, 10, 10},
+        .eeprom_mac_word = 1,
+        .flash_id = 0x14,
+        .part = "6slx16ftg256",
+        .idcode = 0x04002093,
+        .firmware = &firmware_7i76e,
+    },
 };
 
-static const char *const names[] = {"7i96s", "7i96s_7i77d", "7i93", "7i80hd-16", NULL};
+static const char *const names[] = {"7i96s", "7i96s_7i77d", "7i93", "7i80hd-16", "7i76e", NULL};
 
 const char *const *sim_profiles(void)
 {
@@ -231,7 +257,7 @@ const char *const *sim_profiles(void)
 
 const char *sim_profile_list(void)
 {
-    return "7i96s, 7i96s_7i77d, 7i93, 7i80hd-16";
+    return "7i96s, 7i96s_7i77d, 7i93, 7i80hd-16, 7i76e";
 }
 
 const struct sim_profile *sim_profile_find(const char *const name)

@@ -294,3 +294,11 @@ int sslbp_discover(const struct sslbp_port *const port, const unsigned channel,
     const struct sslbp_memory memory = {&remote, read_memory};
     return sslbp_read_tables(&memory, identity, 32u * port->users, name, tables, port->diag);
 }
+
+int sslbp_list(const struct sslbp_port *const port, const unsigned channel, const struct sslbp_identity *const identity,
+               const char *const name, struct sslbp_tables *const tables)
+{
+    struct remote remote = {port, channel};
+    const struct sslbp_memory memory = {&remote, read_memory};
+    return sslbp_read_list(&memory, identity, name, tables, port->diag);
+}

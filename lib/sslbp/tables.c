@@ -22,6 +22,7 @@ struct reader {
     unsigned user_bits;
     struct sslbp_tables *tables;
     struct hm2_diag *diag;
+    bool as_written; /* texts for people, not for HAL */
 };
 
 static int get(const struct reader *const reader, const uint16_t address, const unsigned bytes, uint32_t *const value)
@@ -51,7 +52,7 @@ static int get_text(const struct reader *const reader, uint16_t *const at, char 
             *at = (uint16_t)(*at + i + 1u);
             break;
         }
-        text[i] = fit(c);
+        text[i] = !reader->as_written ? fit(c) : c < ' ' || c > '~' ? '?' : (char)c;
     }
     return 0;
 }
@@ -221,12 +222,31 @@ int sslbp_read_tables(const struct sslbp_memory *const memory, const struct sslb
                       const unsigned user_bits, const char *const name, struct sslbp_tables *const tables,
                       struct hm2_diag *const diag)
 {
-    const struct reader reader = {memory, name, user_bits, tables, diag};
+    const struct reader reader = {memory, name, user_bits, tables, diag, false};
     *tables = (struct sslbp_tables){0};
     const int err = read_toc(&reader, identity->ptoc, "PTOC", add_process, true);
     if (err < 0 || identity->gtoc == 0)
         return err;
     return read_toc(&reader, identity->gtoc, "GTOC", add_global, tables->mode_count == 0);
+}
+
+static int add_entry(const struct reader *const reader, const uint16_t at)
+{
+    struct sslbp_tables *const tables = reader->tables;
+    if (tables->global_count == SSLBP_GLOBAL_MAX)
+        return hm2_diag_add(reader->diag, HM2_ERR_MALFORMED, "%s: more than %u parameters", reader->name,
+                            SSLBP_GLOBAL_MAX);
+    const int err = get_field(reader, at, &tables->global[tables->global_count]);
+    tables->global_count += err == 0;
+    return err;
+}
+
+int sslbp_read_list(const struct sslbp_memory *const memory, const struct sslbp_identity *const identity,
+                    const char *const name, struct sslbp_tables *const tables, struct hm2_diag *const diag)
+{
+    const struct reader reader = {memory, name, 0, tables, diag, true};
+    *tables = (struct sslbp_tables){0};
+    return identity->gtoc == 0 ? 0 : read_toc(&reader, identity->gtoc, "GTOC", add_entry, true);
 }
 
 unsigned sslbp_field_bytes(const struct sslbp_field *const field)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* bench_images CARD FOLDER: image files CARD-old, CARD-new (another build) and CARD-near (differs in its last sector).
- */
+/* bench_images CARD FOLDER: image files CARD-old, CARD-new (another build) and CARD-near (differs from old in its last
+ * sector); CARD-base and CARD-similar (differ in their last 70,000 bytes). */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -22,12 +22,19 @@ static int make(const char *const card, const char *const folder, const char *co
 
 int main(const int argc, char **const argv)
 {
-    enum { LATE = 2000 };
+    static const struct {
+        const char *name;
+        uint64_t seed, late_seed;
+        size_t late_bytes;
+    } rows[] = {
+        {"old", 1, 1, 2000}, {"near", 1, 2, 2000}, {"new", 2, 0, 0}, {"base", 1, 1, 70000}, {"similar", 1, 2, 70000}};
     if (argc != 3)
         return 2;
-    const struct sim_flash_file old = {.profile = argv[1], .seed = 1, .late_seed = 1, .late_bytes = LATE};
-    const struct sim_flash_file near = {.profile = argv[1], .seed = 1, .late_seed = 2, .late_bytes = LATE};
-    const struct sim_flash_file new = {.profile = argv[1], .seed = 2};
-    return make(argv[1], argv[2], "old", &old) || make(argv[1], argv[2], "near", &near) ||
-           make(argv[1], argv[2], "new", &new);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const struct sim_flash_file file = {
+            .profile = argv[1], .seed = rows[i].seed, .late_seed = rows[i].late_seed, .late_bytes = rows[i].late_bytes};
+        if (make(argv[1], argv[2], rows[i].name, &file) != 0)
+            return 1;
+    }
+    return 0;
 }

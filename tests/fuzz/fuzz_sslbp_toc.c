@@ -71,6 +71,29 @@ static void check_process(const struct sslbp_tables *const tables)
         abort();
 }
 
+static void check_printable(const char *text)
+{
+    if (!memchr(text, 0, SSLBP_TEXT_SIZE))
+        abort();
+    for (; *text; text++)
+        if (*text < ' ' || *text > '~')
+            abort();
+}
+
+static void check_list(const struct sslbp_memory *const access, const struct sslbp_identity *const identity)
+{
+    static struct sslbp_tables tables;
+    struct hm2_diag diag = {0};
+    if ((sslbp_read_list(access, identity, "remote", &tables, &diag) == 0) != (diag.problems == 0))
+        abort();
+    for (unsigned i = 0; i < tables.global_count; i++) {
+        check_printable(tables.global[i].name);
+        check_printable(tables.global[i].unit);
+    }
+    for (unsigned i = 0; i < tables.mode_count; i++)
+        check_printable(tables.mode[i].name);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *const data, const size_t size)
 {
     static struct sslbp_tables tables;
@@ -80,6 +103,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *const data, const size_t size)
     struct memory memory = {data + 4, size - 4, 0};
     const struct sslbp_memory access = {&memory, read_memory};
     const struct sslbp_identity identity = {.ptoc = hm2_get_le16(data), .gtoc = hm2_get_le16(data + 2)};
+    check_list(&access, &identity);
+    memory.reads = 0;
     const int err = sslbp_read_tables(&access, &identity, USER_BITS, "remote", &tables, &diag);
     if ((err == 0) != (diag.problems == 0))
         abort();

@@ -70,9 +70,20 @@ static bool counts_packets(const char *const line)
     return false;
 }
 
+/* Of a remote's 32-bit parameters mesaflash 3.4.6 reads those in non-volatile memory only and prints 0 for others. */
+static bool same_but_for_zero(const char *const a, const char *const b)
+{
+    static const char zero[] = "    UnitNumber = 00000000 ";
+    const size_t len = sizeof zero - 1, name = len - 9;
+    return strncmp(a, zero, len) == 0 && strncmp(b, zero, name) == 0 && strlen(b) == strlen(a) &&
+           strcmp(a + len, b + len) == 0;
+}
+
 static bool same_line(const char *const a, const char *const b)
 {
     static char left[4096], right[4096];
+    if (same_but_for_zero(a, b))
+        return true;
     if (strcmp(a, b) == 0 || (counts_packets(a) && counts_packets(b)))
         return true;
     if (!strstr(b, "_Enc") && !strstr(b, "-SSR"))
@@ -132,6 +143,34 @@ START_TEST(texts_that_programs_read_are_mesaflashs)
         for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++)
             compare(card, commands[i]);
     simulator_stop(&sim);
+}
+END_TEST
+
+/* 1.4.5, whole; and what the port needed is given back (mesaflash leaves every pin an input). */
+START_TEST(smart_serial_lists_are_mesaflashs)
+{
+    static const char *const cards[2][12] = {{"--realtime", "--card", "7i93", "--firmware",
+                                              TEST_DATA "/idrom/7I77x2_34.hex", "--remote", "0:0=7i77", "--remote",
+                                              "0:3=7i77d", "--remote", "0:2=7i84"},
+                                             {"--realtime", "--card", "7i96s", "--remote", "0:0=7i76"}};
+    static const char *const commands[][3] = {{"--sserial", NULL}, {"--sserial", "--verbose", NULL}};
+    static const char *const names[2] = {"channel 4: 7I77 ANALOG (unit 0x1100",
+                                         "channel 0: 7I76 GPIO+SPINDLE (unit 0x1000"};
+    if (!has_mesaflash())
+        return;
+    for (unsigned card = 0; card < 2; card++) {
+        simulator_start(&sim, cards[card]);
+        if (card == 1)
+            memcpy(sim.address[1], sim.address[0], sizeof sim.address[0]); /* where the helpers look for a 7I96S */
+        for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++)
+            compare(card, commands[i]);
+        ck_assert_int_eq(run_ours(card, (const char *const[]){"--wpo", "0x1104=0x21", NULL}), 0);
+        ck_assert_int_eq(run_ours(card, commands[0]), 0);
+        if (!strstr(ours.text, names[card]))
+            ck_abort_msg("\"%s\" is not in the list: %s", names[card], ours.text);
+        ck_assert_uint_eq(simulator_read(&sim, 0, 0x1104), 0x21);
+        simulator_stop(&sim);
+    }
 }
 END_TEST
 
@@ -319,6 +358,7 @@ int main(void)
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, NULL, flash_rig_clean);
     tcase_add_test(tests, texts_that_programs_read_are_mesaflashs);
+    tcase_add_test(tests, smart_serial_lists_are_mesaflashs);
     tcase_add_test(tests, info_is_mesaflashs_but_for_its_gap);
     tcase_add_test(tests, what_one_writes_verifies_with_the_other);
     tcase_add_test(tests, backups_are_the_same_and_each_restores_the_others);

@@ -133,6 +133,9 @@ START_TEST(backs_up_and_restores)
     printed("Checksum file '");
     run(REFUSED, "--device", "7i93", "--addr", address, "--backup-flash", dump);
     printed("already exist");
+    ck_assert_ptr_null(strstr(tool.text, "Reading")); /* found out before the chip is read */
+    run(FAILED, "--device", "7i93", "--addr", address, "--backup-flash", "/proc/dump.bin");
+    ck_assert_ptr_null(strstr(tool.text, "Reading"));
     run(DONE, "--device", "7i93", "--addr", address, "--write", image);
     run(DONE, "--device", "7i93", "--addr", address, "--restore-flash", dump);
     printed("Backup file integrity verification passed\n");
@@ -304,11 +307,55 @@ START_TEST(tells_the_way_back_from_a_stored_address)
 }
 END_TEST
 
+/* H14: what is network and broadcast depends on the card's own mask. */
+START_TEST(judges_addresses_by_the_cards_mask)
+{
+    const char *const address = sim.address[0];
+    static const struct {
+        int status;
+        const char *setting;
+    } rows[] = {{DONE, "netmask=255.255.254.0"},
+                {DONE, "ip=10.0.0.255"},
+                {DONE, "ip=10.0.1.0"},
+                {REFUSED, "ip=10.0.0.0"},
+                {REFUSED, "ip=10.0.1.255"},
+                {REFUSED, "netmask=255.255.255.0"},
+                {DONE, "ip=10.0.1.6"},
+                {DONE, "netmask=255.255.255.0"},
+                {REFUSED, "ip=10.0.0.255"},
+                {DONE, "netmask=255.255.255.248"},
+                {REFUSED, "ip=10.0.1.8"},
+                {REFUSED, "ip=10.0.1.15"},
+                {DONE, "ip=10.0.1.9"}};
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        run(rows[i].status, "--addr", address, "--set", rows[i].setting, "--any-traffic");
+}
+END_TEST
+
 START_TEST(prints_daughter_boards_in_capitals)
 {
     run(DONE, "--addr", sim.address[1], "--readhmid", "--dbname1", "7i77");
     printed("7I77");
     ck_assert_ptr_null(strstr(tool.text, "7i77"));
+}
+END_TEST
+
+/* H15: each command that has to do with the flash says which of two chips it is about. */
+START_TEST(reminds_of_the_second_chip)
+{
+    static const char words[] = "the 7I76E has two flash chips, and this concerns only the one that jumper W9 chooses";
+    const char *const image = flash_rig_image("7i76e_a.bit", &(struct sim_flash_file){.profile = "7i76e", .seed = 1});
+    const char *const dump = flash_rig_path("dump.bin");
+    simulator_stop(&sim);
+    simulator_start(&sim, (const char *const[]){"--card", "7i76e", NULL});
+    const char *const commands[][2] = {
+        {"--write", image}, {"--verify", image}, {"--backup-flash", dump}, {"--restore-flash", dump}};
+    for (unsigned i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        run(DONE, "--device", "7i76e", "--addr", sim.address[0], commands[i][0], commands[i][1]);
+        printed(words);
+    }
+    run(DONE, "--device", "7i76e", "--addr", sim.address[0]);
+    ck_assert_ptr_null(strstr(tool.text, "two flash chips"));
 }
 END_TEST
 
@@ -381,7 +428,9 @@ int main(void)
     tcase_add_test(tests, backs_up_before_the_fallback_image_is_replaced);
     tcase_add_test(tests, shows_what_is_wrong_with_the_boot_block);
     tcase_add_test(tests, tells_the_way_back_from_a_stored_address);
+    tcase_add_test(tests, judges_addresses_by_the_cards_mask);
     tcase_add_test(tests, prints_daughter_boards_in_capitals);
+    tcase_add_test(tests, reminds_of_the_second_chip);
     tcase_add_test(tests, refuses_a_file_that_its_check_sum_does_not_fit);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);

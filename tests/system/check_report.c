@@ -23,16 +23,21 @@ static unsigned count(const char *text, const char *const what)
     return found;
 }
 
-static const char *make_report(const char *const type, const char *const device)
+static const char *make_report_of(const char *const *const options, const char *const device)
 {
     const char *const page = flash_rig_path("report.html");
-    simulator_start(&sim, (const char *const[]){"--card", type, NULL});
+    simulator_start(&sim, options);
     const int status = flash_rig_run(&client, process_built("hm2flash"), device, sim.address[0],
                                      (const char *const[]){"--report", page, NULL});
     if (status != 0)
         ck_abort_msg("hm2flash --report: %d: %s", status, client.text);
     simulator_stop(&sim);
     return page;
+}
+
+static const char *make_report(const char *const type, const char *const device)
+{
+    return make_report_of((const char *const[]){"--card", type, NULL}, device);
 }
 
 /* Run the browser on the page with one more option; false when there is none. */
@@ -87,11 +92,26 @@ START_TEST(a_7i96s_is_shown_with_its_terminals_and_its_db25)
     shows("<td>StepGen</td><td class=\"n\">5</td>");
     shows("<td>TB3-13,14</td><td class=\"n\">11</td><td>SSR</td>");
     shows("1 channel on the connectors");
+    shows("None answers.");
     ck_assert_uint_eq(count(browser.text, "<svg class=\"pinout\""), 3);
     ck_assert_uint_eq(count(browser.text, "<rect class=\"pin "), 34);
     ck_assert_uint_eq(count(browser.text, "<circle "), 25);
     ck_assert_uint_eq(count(browser.text, "<circle class=\"gnd\""), 8);
     ck_assert_uint_eq(count(browser.text, "<tr><td>P1-"), 17);
+}
+END_TEST
+
+START_TEST(remotes_are_shown_with_their_modes)
+{
+    static const char *const options[] = {"--realtime", "--card", "7i96s_7i77d", "--remote", "0:0=7i77", NULL};
+    const char *const page = make_report_of(options, "7i96s");
+    if (!browse(page, "--dump-dom"))
+        return;
+    shows("<td class=\"n\">0</td><td class=\"n\">0</td><td>7I77 GPIO</td><td>0x1200");
+    shows("<td>7I77 ANALOG</td><td>0x1100");
+    shows("0: IO_Only, 1: IO_Ana,");
+    shows("0: Analog</td>");
+    ck_assert_ptr_null(strstr(browser.text, "could be asked"));
 }
 END_TEST
 
@@ -146,6 +166,7 @@ int main(void)
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, NULL, flash_rig_clean);
     tcase_add_test(tests, a_7i96s_is_shown_with_its_terminals_and_its_db25);
+    tcase_add_test(tests, remotes_are_shown_with_their_modes);
     tcase_add_test(tests, a_7i93_is_shown_with_its_headers);
     tcase_add_test(tests, the_page_needs_nothing_beside_itself_and_can_be_drawn);
     tcase_add_test(tests, a_page_that_cannot_be_written_is_an_error_and_leaves_nothing);

@@ -205,8 +205,10 @@ static void a_driver_on_the_same_card_is_noticed(void **state)
     struct flash_rig *const rig = *state;
     struct neighbour other = {
         .link = sim_net_link(rig->net), .rig = rig, .next_ns = link_now_ns(sim_net_link(rig->net))};
+    const uint64_t read = flash_card_counters(rig->card).bytes_read;
     sim_net_on_taken(rig->net, drive, &other);
     flash_rig_assert_refused(rig, HM2_ERR_STATE, "another program talks to this card");
+    assert_int_equal(flash_card_counters(rig->card).bytes_read, read); /* its address register was not moved */
     sim_net_on_taken(rig->net, NULL, NULL);
     flash_rig_must_write(rig);
 }
@@ -240,6 +242,25 @@ static bool driver_starts(void *const context, const struct flash_progress *cons
         sim_net_on_taken(other->rig->net, drive, other);
     }
     return true;
+}
+
+static void a_card_that_was_quiet_is_asked_again_when_somebody_comes(void **state)
+{
+    struct flash_rig *const rig = *state;
+    struct link *const link = sim_net_link(rig->net);
+    struct neighbour other = {.link = link, .rig = rig};
+    assert_int_equal(flash_card_quiet(rig->card, &rig->diag), 0);
+    const int64_t before_ns = link_now_ns(link);
+    assert_int_equal(flash_card_quiet(rig->card, &rig->diag), 0); /* known */
+    assert_int_equal(link_now_ns(link), before_ns);
+    other.next_ns = before_ns;
+    sim_net_on_taken(rig->net, drive, &other);
+    uint32_t cookie;
+    assert_int_equal(flash_card_read_hm2(rig->card, 0x100, 1, &cookie, &rig->diag), 0);
+    sim_net_sleep_until(rig->net, before_ns + 5000000);
+    assert_int_equal(flash_card_read_hm2(rig->card, 0x100, 1, &cookie, &rig->diag), 0);
+    assert_int_equal(flash_card_quiet(rig->card, &rig->diag), HM2_ERR_STATE);
+    sim_net_on_taken(rig->net, NULL, NULL);
 }
 
 static void a_driver_that_starts_meanwhile_ends_the_job(void **state)
@@ -334,6 +355,7 @@ int main(void)
         ON_7I96S(a_boot_block_is_never_offered_to_an_efinix_card),
         ON_7I93(a_driver_on_the_same_card_is_noticed),
         ON_7I96S(another_tool_shows_in_the_scratch_register),
+        ON_7I93(a_card_that_was_quiet_is_asked_again_when_somebody_comes),
         ON_7I93(a_driver_that_starts_meanwhile_ends_the_job),
         ON_7I93(a_dump_of_another_card_is_refused),
         ON_7I96S(a_dump_of_another_card_is_refused),

@@ -122,6 +122,8 @@ struct terminals;
 const struct terminals *terminals_of(const struct cli *cli, unsigned port, const char **name);
 const char *connector_of(const struct cli *cli, unsigned port);
 
+/* What a smart-serial remote's unit number says of it: " ANALOG" or nothing. */
+const char *sserial_part(uint32_t unit);
 /* Print the header of an image as --info does. */
 void print_image(const struct cli *cli, const struct flash_image *image);
 /* Wait for the card after a restart and say what runs. */

@@ -259,6 +259,10 @@ static int write_image(struct cli *const cli, const char *const path, const uint
         return status;
     const struct flash_options options = options_of(cli, path);
     announce(cli, bytes, len, options.area);
+    if (!cli->any_traffic)
+        status = report(cli, flash_card_quiet(cli->card, &cli->diag)); /* before the flash is read for the first time */
+    if (status != DONE)
+        return status;
     status = show_boot_difference(cli);
     if (status != DONE)
         return status;
@@ -363,15 +367,28 @@ static void name_backup(const struct cli *const cli, const char *const where, ch
     say(cli, "Used auto naming backup file: '%s'\n", name);
 }
 
-static int save(const struct cli *const cli, const char *const path, const uint8_t *const bytes, const size_t len)
+/* The file is there before the chip is read: a place where none can be made is found out at once (H4). */
+static FILE *reserve(const struct cli *const cli, const char *const path, int *const status)
 {
     FILE *const file = fopen(path, "wbx");
     if (!file && errno == EEXIST)
-        return complain(cli, REFUSED, "File '%s' already exist. Give another name", path);
-    const bool written = file && fwrite(bytes, 1, len, file) == len;
-    if (file && fclose(file) == 0 && written)
-        return DONE;
-    return complain(cli, FAILED, "Can't create file '%s': %s", path, strerror(errno));
+        *status = complain(cli, REFUSED, "File '%s' already exist. Give another name", path);
+    else if (!file)
+        *status = complain(cli, FAILED, "Can't create file '%s': %s", path, strerror(errno));
+    return file;
+}
+
+/* Fill the file, or take it away again when the chip could not be read or the disk is full. */
+static int finish_file(const struct cli *const cli, FILE *const file, const char *const path, int status,
+                       const uint8_t *const bytes, const size_t len)
+{
+    const bool written = status == DONE && fwrite(bytes, 1, len, file) == len;
+    const bool closed = fclose(file) == 0;
+    if (status == DONE && !(written && closed))
+        status = complain(cli, FAILED, "Can't create file '%s': %s", path, strerror(errno));
+    if (status != DONE)
+        (void)remove(path);
+    return status;
 }
 
 static int read_chip(struct cli *const cli, uint8_t *const dump, const size_t len, struct outcome *const outcome)
@@ -397,9 +414,10 @@ int backup_to(struct cli *const cli, const char *const where)
     uint8_t *const dump = malloc(chip->bytes);
     if (!dump)
         return complain(cli, FAILED, "no memory for a dump of %u bytes", (unsigned)chip->bytes);
-    int status = read_chip(cli, dump, chip->bytes, &outcome);
-    if (status == DONE)
-        status = save(cli, path, dump, chip->bytes);
+    int status = DONE;
+    FILE *const file = reserve(cli, path, &status);
+    if (file)
+        status = finish_file(cli, file, path, read_chip(cli, dump, chip->bytes, &outcome), dump, chip->bytes);
     if (status == DONE) {
         say(cli, "FLASH memory backup file '%s' created successfully.\n", path);
         status = write_side_files(cli, path, dump, chip->bytes);

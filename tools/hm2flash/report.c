@@ -112,18 +112,63 @@ static void put_connectors(FILE *const out, const struct cli *const cli, const s
     }
 }
 
-/* Remotes would have to be reset to be asked; the page must not disturb a machine. */
-static void put_remotes(FILE *const out, const struct hm2_idrom *const rom)
+struct remotes {
+    FILE *out;
+    unsigned port, count;
+};
+
+static void put_remote(void *const context, const struct flash_sserial *const port,
+                       const struct flash_remote *const remote)
+{
+    struct remotes *const remotes = context;
+    (void)port;
+    if (!remote)
+        return;
+    if (remotes->count++ == 0)
+        fputs("<table id=\"remote-list\"><tr><th>Port</th><th>Channel</th><th>Remote</th><th>Unit</th><th>Modes</th>"
+              "</tr>\n",
+              remotes->out);
+    fprintf(remotes->out, "<tr><td class=\"n\">%u</td><td class=\"n\">%u</td><td>", remotes->port, remote->channel);
+    html_text(remotes->out, remote->name);
+    html_text(remotes->out, sserial_part(remote->unit));
+    fprintf(remotes->out, "</td><td>0x%08X</td><td>", (unsigned)remote->unit);
+    for (unsigned i = 0; i < remote->tables.mode_count; i++) {
+        fprintf(remotes->out, "%s%u: ", i ? ", " : "", remote->tables.mode[i].index);
+        html_text(remotes->out, remote->tables.mode[i].name);
+    }
+    fputs("</td></tr>\n", remotes->out);
+}
+
+/* Remotes are reset to be asked, so only on a card that nobody drives. What is wrong with them belongs on the page. */
+static void ask_remotes(FILE *const out, struct cli *const cli)
+{
+    struct remotes remotes = {.out = out};
+    int err = cli->any_traffic ? 0 : flash_card_quiet(cli->card, &cli->diag);
+    for (; err == 0; remotes.port += err == 0)
+        err = flash_card_sserial(cli->card, remotes.port, put_remote, &remotes, &cli->diag);
+    fputs(remotes.count > 0 ? "</table>\n" : "", out);
+    if (err != HM2_ERR_NOTFOUND) {
+        fputs("<p class=\"warn\">Not all remotes could be asked: ", out);
+        html_text(out, cli->diag.text);
+        fputs("</p>\n", out);
+    } else if (remotes.count == 0) {
+        fputs("<p>None answers.</p>\n", out);
+    }
+    hm2_diag_clear(&cli->diag);
+}
+
+static void put_remotes(FILE *const out, struct cli *const cli, const struct hm2_idrom *const rom)
 {
     unsigned channels = 0;
     for (unsigned io = 0; io < rom->pin_count; io++) {
         const struct hm2_pd *const pd = &rom->pins[io];
-        channels += pd->secondary_tag == HM2_GTAG_SSERIAL && pd->secondary_pin >> 4 == 0;
+        channels += (pd->secondary_tag == HM2_GTAG_SSERIAL || pd->secondary_tag == HM2_GTAG_SSERIALB) &&
+                    pd->secondary_pin >> 4 == 0;
     }
-    fprintf(out,
-            "<h2>Smart-serial remotes</h2>\n<p id=\"remotes\">%u channel%s on the connectors. Remotes are not asked "
-            "for this page: that would stop them. <code>hm2flash --sserial</code> lists them.</p>\n",
-            channels, channels == 1 ? "" : "s");
+    fprintf(out, "<h2>Smart-serial remotes</h2>\n<p id=\"remotes\">%u channel%s on the connectors.</p>\n", channels,
+            channels == 1 ? "" : "s");
+    if (channels > 0)
+        ask_remotes(out, cli);
 }
 
 static int put_page(FILE *const out, struct cli *const cli)
@@ -154,7 +199,7 @@ static int put_page(FILE *const out, struct cli *const cli)
     }
     put_modules(out, &rom);
     put_connectors(out, cli, &rom);
-    put_remotes(out, &rom);
+    put_remotes(out, cli, &rom);
     fputs("</body></html>\n", out);
     return 0;
 }

@@ -10,6 +10,7 @@
 
 #define NETMASK_FIRMWARE 16u
 #define JUMPERS_EEPROM   1u
+#define USUAL_MASK       0xFFFFFF00u
 #define RETURN_NS        INT64_C(15000000000)
 #define REGISTERS        0x10000u
 
@@ -124,6 +125,31 @@ static bool parse_ip(const char *const text, uint8_t ip[const 4])
     return true;
 }
 
+static uint32_t number_of(const uint8_t ip[const 4])
+{
+    return (uint32_t)ip[0] << 24 | (uint32_t)ip[1] << 16 | (uint32_t)ip[2] << 8 | ip[3];
+}
+
+/* Ones, then zeros, and both. */
+static bool is_mask(const uint32_t mask)
+{
+    return mask != 0 && mask != UINT32_MAX && (~mask & (~mask + 1)) == 0;
+}
+
+/* Can a card in a network of this mask have the address: neither the network's own nor its broadcast (H14)? */
+static bool is_host(const uint8_t ip[const 4], const uint32_t mask)
+{
+    const uint32_t host = number_of(ip) & ~mask;
+    return ip[0] != 0 && ip[0] < 224 && host != 0 && host != ~mask;
+}
+
+/* The card's own mask, or the usual one when its firmware or its EEPROM has none. */
+static uint32_t mask_of(const struct flash_card_info *const info)
+{
+    const uint32_t mask = number_of(info->netmask);
+    return info->firmware >= NETMASK_FIRMWARE && is_mask(mask) ? mask : USUAL_MASK;
+}
+
 /* The low word comes first, and of each word the low byte. */
 static int store_address(struct cli *const cli, const uint16_t at, const uint8_t ip[const 4])
 {
@@ -152,8 +178,11 @@ static int set_ip(struct cli *const cli, const char *const value)
         say(cli, "Error: invalid format of IP address\n");
         return complain(cli, USAGE, "--set ip=%s: expected an address like 192.168.1.121", value);
     }
-    if (ip[0] == 0 || ip[0] >= 224 || (ip[3] == 0 && ip[0] != 127) || ip[3] == 255)
-        return complain(cli, REFUSED, "%s is no address that a card can have (network, broadcast or multicast)", value);
+    if (!is_host(ip, mask_of(cli->info)))
+        return complain(cli, REFUSED,
+                        "%s is no address that a card with the network mask %08X can have (network, broadcast or "
+                        "multicast)",
+                        value, (unsigned)mask_of(cli->info));
     const int status = store_address(cli, LBP16_EEPROM_IP, ip);
     if (status == DONE) {
         say(cli, "Board IP updated successfully.\n");
@@ -167,12 +196,16 @@ static int set_netmask(struct cli *const cli, const char *const value)
     uint8_t m[4];
     if (!parse_ip(value, m))
         return complain(cli, USAGE, "--set netmask=%s: expected a mask like 255.255.255.0", value);
-    const uint32_t mask = (uint32_t)m[0] << 24 | (uint32_t)m[1] << 16 | (uint32_t)m[2] << 8 | m[3];
-    if (mask == 0 || mask == UINT32_MAX || (~mask & (~mask + 1)) != 0)
+    if (!is_mask(number_of(m)))
         return complain(cli, REFUSED, "%s is no network mask: ones, then zeros, and both", value);
     if (cli->info->firmware < NETMASK_FIRMWARE)
         return complain(cli, REFUSED, "the card's firmware is %u; a mask needs %u", cli->info->firmware,
                         NETMASK_FIRMWARE);
+    if (!is_host(cli->info->ip, number_of(m)))
+        return complain(cli, REFUSED,
+                        "with the mask %s the address in the EEPROM, %u.%u.%u.%u, would be that of a network "
+                        "or a broadcast: set another address first",
+                        value, cli->info->ip[0], cli->info->ip[1], cli->info->ip[2], cli->info->ip[3]);
     const int status = store_address(cli, LBP16_EEPROM_NETMASK, m);
     if (status == DONE)
         say(cli, "Board netmask updated successfully.\n");

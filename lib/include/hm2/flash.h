@@ -23,6 +23,7 @@
 #include <hm2/idrom.h>
 #include <hm2/lbp16.h>
 #include <hm2/link.h>
+#include <hm2/sslbp.h>
 
 #define FLASH_SECTOR_BYTES 65536u
 #define FLASH_PAGE_BYTES   256u
@@ -185,24 +186,33 @@ struct flash_survey {
 HM2_API int HM2_MUST_CHECK flash_card_survey(struct flash_card *card, struct flash_survey *survey,
                                              struct hm2_diag *diag);
 /* Refuse (HM2_ERR_STATE) when somebody else talks to the card: packet counters that move by themselves for 100 ms, or a
- * signature in its scratch register that does not stay (H10, H11). */
+ * signature in its scratch register that does not stay (H10, H11). Takes 100 ms, and nothing when it was found a second
+ * ago and nobody has turned up since. */
 HM2_API int HM2_MUST_CHECK flash_card_quiet(struct flash_card *card, struct hm2_diag *diag);
 /* Number of I/O pins that are outputs now (H19); negative = error. */
 HM2_API int HM2_MUST_CHECK flash_card_outputs(struct flash_card *card, struct hm2_diag *diag);
 
-/* What is at a smart-serial port. The port is reset and its pins are switched to it meanwhile: refuse before (see
- * flash_card_quiet()) when a machine may run. HM2_ERR_NOTFOUND, without a sentence, when there is no such port. */
-#define FLASH_SSERIAL_CHANNELS 8u
+/* What a smart-serial port says of itself, and what each remote at it does. */
 struct flash_sserial {
-    uint8_t type, width, major, minor, processor;
-    unsigned channels;
-    uint32_t baud;
-    bool present[FLASH_SSERIAL_CHANNELS]; /* a remote device answered */
-    uint32_t unit[FLASH_SSERIAL_CHANNELS];
-    char name[FLASH_SSERIAL_CHANNELS][5];
+    uint8_t type, width, major, minor, first, stride, processor, channels; /* local parameters 0 to 7 */
+    uint32_t baud, clock_hz;
 };
-HM2_API int HM2_MUST_CHECK flash_card_sserial(struct flash_card *card, unsigned port, struct flash_sserial *out,
-                                              struct hm2_diag *diag);
+
+struct flash_remote {
+    unsigned channel;
+    uint32_t unit;
+    char name[5];                      /* printable */
+    struct sslbp_tables tables;        /* as sslbp_list() fills them */
+    uint64_t values[SSLBP_GLOBAL_MAX]; /* of tables.global */
+    bool known[SSLBP_GLOBAL_MAX];      /* the value could be read */
+};
+
+/* Ask a port: the function is called with remote = NULL first, then for each remote that answers. The port is reset and
+ * its pins are switched to it meanwhile, and given back afterwards: refuse before (see flash_card_quiet()) when a
+ * machine may run. HM2_ERR_NOTFOUND, without a sentence, when there is no such port. */
+typedef void (*flash_sserial_fn)(void *context, const struct flash_sserial *port, const struct flash_remote *remote);
+HM2_API int HM2_MUST_CHECK flash_card_sserial(struct flash_card *card, unsigned port, flash_sserial_fn each,
+                                              void *context, struct hm2_diag *diag);
 
 /* Any memory space of 16-bit items, and HostMot2's registers. */
 HM2_API int HM2_MUST_CHECK flash_card_read16(struct flash_card *card, enum lbp16_space space, uint16_t address,

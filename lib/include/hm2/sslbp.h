@@ -198,6 +198,14 @@ HM2_API int HM2_MUST_CHECK sslbp_read_tables(const struct sslbp_memory *memory, 
 HM2_API int HM2_MUST_CHECK sslbp_discover(const struct sslbp_port *port, unsigned channel,
                                           const struct sslbp_identity *identity, const char *name,
                                           struct sslbp_tables *tables);
+/* What a remote of a port in set-up mode says of itself, for lists that people read: all records of its global table in
+ * their order, in tables->global and tables->mode, with texts as the remote has them (what cannot be printed becomes
+ * "?"). Nothing is checked beyond the limits of the tables: bits may be 0 to 255, type anything. */
+HM2_API int HM2_MUST_CHECK sslbp_list(const struct sslbp_port *port, unsigned channel,
+                                      const struct sslbp_identity *identity, const char *name,
+                                      struct sslbp_tables *tables);
+HM2_API int HM2_MUST_CHECK sslbp_read_list(const struct sslbp_memory *memory, const struct sslbp_identity *identity,
+                                           const char *name, struct sslbp_tables *tables, struct hm2_diag *diag);
 /* Bytes that a parameter occupies: 1, 2, 4 or 8. Realtime safe. */
 HM2_API unsigned sslbp_field_bytes(const struct sslbp_field *field);
 HM2_API bool sslbp_is_nonvolatile(const struct sslbp_field *field);
