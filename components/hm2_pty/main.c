@@ -73,7 +73,7 @@ static const struct hm2_point points[] = {
     HM2_POINT(struct terminal, rx_overruns, "rx-overruns", HM2_U32, HM2_PIN_OUT, 0, "",
               "times that the card's buffers ran over and were cleared"),
     HM2_POINT(struct terminal, rx_uncertain, "rx-uncertain", HM2_U32, HM2_PIN_OUT, 0, "",
-              "bytes that may have been lost with a reply"),
+              "bytes that may have been lost with a reply, at most"),
     HM2_POINT(struct terminal, tx_uncertain, "tx-uncertain", HM2_U32, HM2_PIN_OUT, 0, "",
               "bytes that may not have been sent, for the same reason"),
 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * PktUART: bytes travel in frames. In each cycle up to four sizes of received frames are taken, and up to 63 words of
+ * PktUART: bytes travel in frames. In each cycle up to seven sizes of received frames are taken, or up to 63 words of
  * those whose size is known; up to 63 words are sent as one frame. Traps of the firmware (Annex D) and what is done
  * about them: the first count is lost without a clear, so a clear precedes every mode; with automatic drive enable the
  * last of several frames is stranded, so one is sent at a time; frames beyond the buffers are told by what is left
@@ -9,23 +9,16 @@
 #include <string.h>
 
 #include "module_types.h"
-#include "serial.h"
-
-enum { REG_DATA, REG_COUNT, REG_RATE, REG_MODE };
+#include "pktuart_rx.h"
 
 #define CLEAR          0x80010000u
 #define BLOCKS         6u
 #define WORDS          63u
-#define COUNTS         4u
 #define FRAMES         16u
 #define BUFFER_WORDS   255u /* with one more bit 21 reads as if there were none */
 #define QUEUED_FRAMES  12u
-#define SIZE_MASK      0x3FFu
-#define SIZE_ERRORS    (7u << 14)
 #define MODE_FRAMES(m) ((m) >> 16 & 0x1Fu)
-#define MODE_DATA      (1u << 21)
 #define MODE_ACTIVE    (1u << 7)
-#define MODE_ERROR     (1u << 4)
 #define TX_DRIVE       (1u << 6)
 #define TX_AUTO        (1u << 5)
 #define RX_ENABLE      (1u << 3)
@@ -43,30 +36,13 @@ enum { REG_DATA, REG_COUNT, REG_RATE, REG_MODE };
 struct pktuart {
     struct hm2_serial port; /* first: a port is found through it */
     unsigned version, rate_bits;
-    uint16_t tx[4], rx[4]; /* registers */
-
     struct hm2_section tx_rate, rx_rate, tx_mode, rx_mode, rx_clear;
-    struct queue out, in;
-    struct hm2_window out_count, in_count[COUNTS], tx_state, rx_state;
-
-    bool awaiting; /* a write and a request with our words are on their way */
-    bool resend;   /* the last write was lost: the same again */
-    unsigned sent_bytes, sent_words;
+    struct queue out;
+    struct hm2_window out_count, tx_state;
     unsigned queued, queued_words; /* frames in the card, as far as known */
     uint8_t queue_words[FRAMES];
-    uint32_t tx_mode_seen, rx_mode_seen;
-
-    unsigned popped_words, popped_counts; /* asked for */
-    uint64_t request;                     /* in this one */
-    bool unanswered;                      /* which was given up: nothing more is asked for until its reply is late or
-                                           * a later one shows that it is lost */
-    unsigned sizes;                       /* frames whose size is known, oldest first */
-    uint16_t size[FRAMES];
-    bool clearing;
-};
-
-struct pktuarts {
-    struct pktuart *port;
+    uint32_t tx_mode_seen;
+    struct pkt_rx rx;
 };
 
 static const struct hm2_md_variant variants[] = {{0, 4, 4, 0xF}, {1, 4, 4, 0xF}, {2, 4, 4, 0xF}, {3, 4, 4, 0xF}};
@@ -78,31 +54,25 @@ static const struct hm2_point_group groups[] = {{NULL, NULL, 0, NULL}};
 static int open_port(struct hm2_serial *const port, struct hm2_diag *const diag)
 {
     struct pktuart *const p = (struct pktuart *)port;
-    p->in.fifo = p->rx[REG_DATA];
-    p->in.nowhere = p->rx[REG_RATE]; /* to read it does nothing */
-    p->out.fifo = p->tx[REG_DATA];
+    p->out.fifo = p->port.tx_reg[SERIAL_DATA];
     p->out.nowhere = HM2_PLAN_NOWHERE;
     int err = queue_add_writes(&p->out, port->plan, BLOCKS, diag);
     if (!err)
         err = hm2_plan_add_queue_write(port->plan, &p->out_count, HM2_PLAN_NOWHERE, 1, diag);
     if (!err)
-        err = queue_add_reads(&p->in, port->plan, BLOCKS, diag);
-    for (unsigned i = 0; i < COUNTS && !err; i++)
-        err = hm2_plan_add_queue_read(port->plan, &p->in_count[i], p->rx[REG_RATE], 1, diag);
+        err = pkt_rx_add(&p->rx, port, diag);
     if (!err)
-        err = hm2_plan_add_queue_read(port->plan, &p->rx_state, p->rx[REG_MODE], 1, diag);
-    if (!err)
-        err = hm2_plan_add_queue_read(port->plan, &p->tx_state, p->tx[REG_MODE], 1, diag);
+        err = hm2_plan_add_queue_read(port->plan, &p->tx_state, p->port.tx_reg[SERIAL_MODE], 1, diag);
     const struct {
         struct hm2_section *section;
         uint16_t address;
         unsigned words, flags;
     } rows[] = {
-        {&p->tx_rate, p->tx[REG_RATE], 1, 0},
-        {&p->rx_rate, p->rx[REG_RATE], 1, 0},
-        {&p->tx_mode, p->tx[REG_MODE], 2, HM2_SECTION_FIFO},
-        {&p->rx_mode, p->rx[REG_MODE], 2, HM2_SECTION_FIFO},
-        {&p->rx_clear, p->rx[REG_MODE], 1, HM2_SECTION_ON_DEMAND},
+        {&p->tx_rate, p->port.tx_reg[SERIAL_RATE], 1, 0},
+        {&p->rx_rate, p->port.rx_reg[SERIAL_RATE], 1, 0},
+        {&p->tx_mode, p->port.tx_reg[SERIAL_MODE], 2, HM2_SECTION_FIFO},
+        {&p->rx_mode, p->port.rx_reg[SERIAL_MODE], 2, HM2_SECTION_FIFO},
+        {&p->rx_clear, p->port.rx_reg[SERIAL_MODE], 1, HM2_SECTION_ON_DEMAND},
     };
     for (size_t i = 0; i < sizeof rows / sizeof rows[0] && !err; i++)
         err = hm2_plan_add_setup(port->plan, rows[i].section, HM2_RANK_NORMAL, rows[i].address, rows[i].words,
@@ -167,13 +137,10 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
                         filter_of(p, s->baud) << FILTER_SHIFT);
     hm2_section_touch(&p->tx_mode);
     hm2_section_touch(&p->rx_mode);
-    p->queued = p->queued_words = p->sizes = 0;
-    p->popped_words = p->popped_counts = 0;
-    p->unanswered = false;
+    p->queued = p->queued_words = 0;
+    pkt_rx_forget(&p->rx, port);
     return 0;
 }
-
-static const struct serial_ops ops = {open_port, set_port};
 
 /* Firmware sources differ in the width of the rate register whatever the version says (Annex D). */
 static int probe_rate(struct hm2_setup *const setup, const uint16_t address, unsigned *const bits)
@@ -189,125 +156,27 @@ static int probe_rate(struct hm2_setup *const setup, const uint16_t address, uns
     return err;
 }
 
-static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
-{
-    const struct hm2_md *const rx = hm2_idrom_find(setup->idrom, HM2_GTAG_PKTUART_RX);
-    if (module->instances == 0)
-        return 0;
-    if (!rx || rx->instances < module->instances)
-        return hm2_diag_add(setup->diag, HM2_ERR_MISMATCH,
-                            "%s: the firmware has %u PktUART transmitters and %u receivers", setup->prefix,
-                            module->md->instances, rx ? rx->instances : 0);
-    struct pktuarts *const ctx = hm2_setup_alloc(setup, sizeof *ctx);
-    if (!ctx)
-        return HM2_ERR_NOMEM;
-    ctx->port = hm2_setup_alloc(setup, module->instances * sizeof *ctx->port);
-    if (!ctx->port)
-        return HM2_ERR_NOMEM;
-    module->context = ctx;
-    unsigned bits = NARROW_BITS;
-    int err = hm2_claim_pins(module, setup, HM2_GTAG_NONE, module->instances, false, NULL);
-    if (!err)
-        err = hm2_claim_pins(module, setup, HM2_GTAG_PKTUART_RX, module->instances, false, NULL);
-    if (!err)
-        err = probe_rate(setup, hm2_md_address(module->md, REG_RATE, 0), &bits);
-    for (unsigned unit = 0; unit < module->instances; unit++) {
-        struct pktuart *const p = &ctx->port[unit];
-        p->port.ops = &ops;
-        p->port.plan = setup->plan;
-        p->port.clock_hz = module->md->clock_hz;
-        p->version = module->md->version;
-        p->rate_bits = bits;
-        for (unsigned i = 0; i < 4; i++) {
-            p->tx[i] = hm2_md_address(module->md, i, unit);
-            p->rx[i] = hm2_md_address(rx, i, unit);
-        }
-    }
-    return err;
-}
-
-struct hm2_serial *pktuart_port(const struct hm2_module *const module, const unsigned unit)
-{
-    const struct pktuarts *const ctx = module->context;
-    return &ctx->port[unit].port;
-}
-
 /* ---- reply ----------------------------------------------------------------------------------------------------------
  */
 
-/* Sizes and data no longer belong together, or something was lost: begin anew. */
-static void start_over(struct pktuart *const p)
+static unsigned sent_words(const struct pktuart *const p)
 {
-    p->sizes = p->popped_words = p->popped_counts = 0;
-    p->unanswered = false;
-    p->clearing = true;
-    hm2_section_touch(&p->rx_clear);
+    return (p->port.sent_bytes + 3u) / 4u;
 }
 
-static void take_words(struct pktuart *const p)
+static void queue_frame(struct pktuart *const p)
 {
-    for (unsigned n = 0; n < p->popped_words && p->sizes > 0; n++) {
-        const struct queue_place at = queue_place(&p->in, p->popped_words, n);
-        uint8_t bytes[4];
-        hm2_put_le32(bytes, hm2_window_get(at.window, at.word));
-        const unsigned len = p->size[0] < 4u ? p->size[0] : 4u;
-        p->port.counts.rx_bytes += (uint32_t)ring_put(&p->port.rx, bytes, len);
-        p->size[0] = (uint16_t)(p->size[0] - len);
-        if (p->size[0] == 0)
-            memmove(p->size, p->size + 1, --p->sizes * sizeof p->size[0]);
-    }
-    p->popped_words = 0;
-}
-
-static void take_sizes(struct pktuart *const p)
-{
-    for (unsigned i = 0; i < p->popped_counts; i++) {
-        const uint32_t count = hm2_window_get(&p->in_count[i], 0);
-        if (count & SIZE_ERRORS)
-            p->port.counts.rx_errors++;
-        if ((count & SIZE_MASK) != 0)
-            p->size[p->sizes++] = (uint16_t)(count & SIZE_MASK);
-    }
-    p->popped_counts = 0;
-}
-
-/* A later reply has come before the one with what was asked for: that is lost, and with it the frames it belongs to. */
-static void lose_frames(struct pktuart *const p)
-{
-    for (unsigned i = 0; i < p->sizes; i++)
-        p->port.counts.rx_uncertain += p->size[i];
-    p->port.counts.rx_errors += p->sizes + p->popped_counts;
-    start_over(p);
-}
-
-static void take_received(struct pktuart *const p)
-{
-    if (p->unanswered)
-        lose_frames(p);
-    p->rx_mode_seen = hm2_window_get(&p->rx_state, 0);
-    if (p->clearing) {
-        p->clearing = !hm2_section_confirmed(&p->rx_clear);
+    if (p->port.sent_bytes == 0 || p->queued == FRAMES)
         return;
-    }
-    take_words(p);
-    take_sizes(p);
-    const bool idle = !(p->rx_mode_seen & MODE_ACTIVE) && MODE_FRAMES(p->rx_mode_seen) == 0;
-    const bool left_over = idle && p->sizes == 0 && (p->rx_mode_seen & MODE_DATA);
-    if (p->rx_mode_seen & MODE_ERROR || left_over) {
-        p->port.counts.rx_overruns++;
-        start_over(p);
-    }
+    p->queue_words[p->queued++] = (uint8_t)sent_words(p);
+    p->queued_words += sent_words(p);
 }
 
 static void take_sent(struct pktuart *const p)
 {
     p->tx_mode_seen = hm2_window_get(&p->tx_state, 0);
-    if (!p->resend && p->sent_words > 0) {
-        p->port.counts.tx_bytes += p->sent_bytes;
-        p->queue_words[p->queued++] = (uint8_t)p->sent_words;
-        p->queued_words += p->sent_words;
-        p->sent_words = 0;
-    }
+    if (!p->port.resend)
+        queue_frame(p);
     const unsigned there = MODE_FRAMES(p->tx_mode_seen) + ((p->tx_mode_seen & MODE_ACTIVE) != 0);
     while (p->queued > there) {
         p->queued_words -= p->queue_words[0];
@@ -315,50 +184,33 @@ static void take_sent(struct pktuart *const p)
     }
 }
 
-static void unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
+static void take(struct hm2_serial *const port)
 {
-    const struct pktuarts *const ctx = module->context;
-    (void)cycle;
-    for (struct pktuart *p = ctx->port, *const end = p + module->instances; p < end; p++) {
-        if (!p->port.open || !p->awaiting)
-            continue;
-        p->awaiting = false;
-        take_sent(p);
-        take_received(p);
-    }
+    struct pktuart *const p = (struct pktuart *)port;
+    take_sent(p);
+    const enum pkt_rx_health health = pkt_rx_take(&p->rx, port);
+    if (p->rx.clearing)
+        p->rx.clearing = !hm2_section_confirmed(&p->rx_clear);
+    if (health == PKT_RX_GOOD)
+        return;
+    port->counts.rx_overruns += health == PKT_RX_OVERRUN;
+    pkt_rx_clear(&p->rx, port);
+    hm2_section_touch(&p->rx_clear);
 }
 
-static void late(struct hm2_module *const module, const uint64_t request)
+static void late(struct hm2_serial *const port, const uint64_t request)
 {
-    const struct pktuarts *const ctx = module->context;
-    for (unsigned unit = 0; ctx && unit < module->instances; unit++) {
-        struct pktuart *const p = &ctx->port[unit];
-        if (!p->port.open || p->clearing || p->request != request)
-            continue;
-        p->rx_mode_seen = hm2_window_get(&p->rx_state, 0);
-        take_words(p);
-        take_sizes(p);
-        p->unanswered = false;
-    }
-}
-
-static void write_lost(struct hm2_module *const module)
-{
-    const struct pktuarts *const ctx = module->context;
-    for (unsigned unit = 0; ctx && unit < module->instances; unit++)
-        ctx->port[unit].resend = ctx->port[unit].sent_words > 0;
+    pkt_rx_late(&((struct pktuart *)port)->rx, port, request);
 }
 
 /* ---- write ----------------------------------------------------------------------------------------------------------
  */
 
-/* No fresh reply since the last write: what was asked for may still come, and nobody knows what the card sent. */
-static void miss(struct pktuart *const p)
+static void miss(struct hm2_serial *const port)
 {
-    p->unanswered = p->popped_words > 0 || p->popped_counts > 0;
-    p->port.counts.tx_uncertain += p->sent_words > 0 ? p->sent_bytes : 0;
-    p->sent_words = 0;
-    p->resend = false;
+    struct pktuart *const p = (struct pktuart *)port;
+    queue_frame(p); /* it may be in the card */
+    pkt_rx_miss(&p->rx);
 }
 
 static bool may_send(const struct pktuart *const p)
@@ -370,67 +222,51 @@ static bool may_send(const struct pktuart *const p)
     return p->port.settings.drive == HM2_DRIVE_ON && p->queued < QUEUED_FRAMES;
 }
 
-static void send_frame(struct pktuart *const p)
+static void send_frame(struct hm2_serial *const port)
 {
+    struct pktuart *const p = (struct pktuart *)port;
     uint8_t bytes[4u * WORDS] = {0};
     const unsigned free_words = BUFFER_WORDS - p->queued_words;
-    const unsigned words = free_words < WORDS ? free_words : WORDS;
-    p->sent_bytes = may_send(p) ? (unsigned)ring_get(&p->port.tx, bytes, (size_t)4u * words) : 0;
-    p->sent_words = (p->sent_bytes + 3u) / 4u;
-    queue_aim(&p->out, p->sent_words);
-    for (unsigned n = 0; n < p->sent_words; n++) {
-        const struct queue_place at = queue_place(&p->out, p->sent_words, n);
+    const unsigned most = free_words < WORDS ? free_words : WORDS;
+    port->sent_bytes = may_send(p) ? (unsigned)ring_get(&port->tx, bytes, (size_t)4u * most) : 0;
+    const unsigned words = sent_words(p);
+    queue_aim(&p->out, words);
+    for (unsigned n = 0; n < words; n++) {
+        const struct queue_place at = queue_place(&p->out, words, n);
         hm2_window_set(at.window, at.word, hm2_get_le32(bytes + 4u * n));
     }
-    hm2_put_le16(p->out_count.address, p->sent_bytes ? p->tx[REG_COUNT] : HM2_PLAN_NOWHERE);
-    hm2_window_set(&p->out_count, 0, p->sent_bytes);
+    hm2_put_le16(p->out_count.address, words ? port->tx_reg[SERIAL_COUNT] : HM2_PLAN_NOWHERE);
+    hm2_window_set(&p->out_count, 0, port->sent_bytes);
 }
 
-static unsigned known_words(const struct pktuart *const p)
+static void ask(struct hm2_serial *const port)
 {
-    unsigned words = 0;
-    for (unsigned i = 0; i < p->sizes; i++)
-        words += (p->size[i] + 3u) / 4u;
-    return words;
+    struct pktuart *const p = (struct pktuart *)port;
+    const bool set_up = hm2_section_confirmed(&p->rx_mode) && hm2_section_confirmed(&p->rx_rate);
+    if (!set_up)
+        pkt_rx_forget(&p->rx, port); /* a mode comes with a clear */
+    pkt_rx_ask(&p->rx, port, set_up && !p->rx.clearing);
 }
 
-static void ask_received(struct pktuart *const p)
+static const struct serial_ops ops = {
+    .open = open_port, .set = set_port, .take = take, .late = late, .miss = miss, .send = send_frame, .ask = ask};
+
+static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 {
-    if (p->unanswered) {
-        queue_aim(&p->in, 0);
-        for (unsigned i = 0; i < COUNTS; i++)
-            hm2_put_le16(p->in_count[i].address, p->rx[REG_RATE]);
-        return;
+    static const struct serial_kind kind = {
+        .title = "PktUART", .rx_gtag = HM2_GTAG_PKTUART_RX, .size = sizeof(struct pktuart), .ops = &ops};
+    if (module->instances == 0)
+        return 0;
+    unsigned bits = NARROW_BITS;
+    int err = serial_setup(module, setup, &kind);
+    if (!err)
+        err = probe_rate(setup, hm2_md_address(module->md, SERIAL_RATE, 0), &bits);
+    for (unsigned unit = 0; unit < module->instances && !err; unit++) {
+        struct pktuart *const p = (struct pktuart *)serial_port(module, unit);
+        p->version = module->md->version;
+        p->rate_bits = bits;
     }
-    const bool ready = !p->clearing && hm2_section_confirmed(&p->rx_mode) && hm2_section_confirmed(&p->rx_rate);
-    const unsigned room = (RING_BYTES - ring_used(&p->port.rx)) / 4u, known = known_words(p);
-    const unsigned words = known < WORDS ? known : WORDS;
-    p->popped_words = !ready ? 0 : words < room ? words : room;
-    p->request = hm2_plan_requests(p->port.plan) + 1u;
-    queue_aim(&p->in, p->popped_words);
-    const unsigned there = ready ? MODE_FRAMES(p->rx_mode_seen) : 0;
-    const unsigned places = FRAMES - p->sizes;
-    p->popped_counts = there < COUNTS ? there : COUNTS;
-    p->popped_counts = p->popped_counts < places ? p->popped_counts : places;
-    for (unsigned i = 0; i < COUNTS; i++)
-        hm2_put_le16(p->in_count[i].address, i < p->popped_counts ? p->rx[REG_COUNT] : p->rx[REG_RATE]);
-}
-
-static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
-{
-    const struct pktuarts *const ctx = module->context;
-    (void)cycle;
-    for (struct pktuart *p = ctx->port, *const end = p + module->instances; p < end; p++) {
-        if (!p->port.open)
-            continue;
-        if (p->awaiting)
-            miss(p);
-        if (!p->resend)
-            send_frame(p);
-        p->resend = false;
-        ask_received(p);
-        p->awaiting = true;
-    }
+    return err;
 }
 
 const struct hm2_module_type hm2_pktuart_type = {
@@ -440,20 +276,12 @@ const struct hm2_module_type hm2_pktuart_type = {
     .variant_count = sizeof variants / sizeof variants[0],
     .config_count = HM2_CFG_PKTUARTS,
     .setup = setup,
-    .unpack = unpack,
-    .pack = pack,
-    .write_lost = write_lost,
-    .late = late,
+    .unpack = serial_unpack,
+    .pack = serial_pack,
+    .write_lost = serial_write_lost,
+    .late = serial_late,
     .groups = groups,
 };
-
-/* The receiver belongs to the transmitter of its number, which sets both up. */
-static int setup_receiver(struct hm2_module *const module, struct hm2_setup *const setup)
-{
-    (void)module;
-    (void)setup;
-    return 0;
-}
 
 const struct hm2_module_type hm2_pktuart_rx_type = {
     .name = "pktuart_rx",
@@ -461,6 +289,6 @@ const struct hm2_module_type hm2_pktuart_rx_type = {
     .variants = variants,
     .variant_count = sizeof variants / sizeof variants[0],
     .config_count = HM2_CFG_PKTUARTS,
-    .setup = setup_receiver,
+    .setup = serial_setup_receiver,
     .groups = groups,
 };

@@ -79,9 +79,7 @@ struct hm2_serial *hm2_serial_port(struct hm2_board *const board, const enum hm2
 {
     const bool uart = kind == HM2_SERIAL_UART;
     const struct hm2_module *const module = hm2_board_module(board, uart ? HM2_GTAG_UART_TX : HM2_GTAG_PKTUART_TX);
-    if (!module || !module->context || unit >= module->instances)
-        return NULL;
-    return uart ? uart_port(module, unit) : pktuart_port(module, unit);
+    return module ? serial_port(module, unit) : NULL;
 }
 
 int hm2_serial_open(struct hm2_serial *const port, struct hm2_diag *const diag)
@@ -141,4 +139,119 @@ size_t hm2_serial_waiting(const struct hm2_serial *const port)
 struct hm2_serial_counts hm2_serial_counts(const struct hm2_serial *const port)
 {
     return port->counts;
+}
+
+/* ---- the ports of a module ------------------------------------------------------------------------------------------
+ */
+
+static void locate(struct hm2_serial *const port, const struct hm2_md *const tx, const struct hm2_md *const rx,
+                   const unsigned unit, const unsigned unit_stride)
+{
+    for (unsigned i = 0; i < SERIAL_REGISTERS; i++) {
+        const unsigned there = unit_stride ? 0 : unit, beyond = unit_stride * unit;
+        port->tx_reg[i] = (uint16_t)(hm2_md_address(tx, i, there) + beyond);
+        port->rx_reg[i] = (uint16_t)(hm2_md_address(rx, i, there) + beyond);
+    }
+}
+
+int serial_setup(struct hm2_module *const module, struct hm2_setup *const setup, const struct serial_kind *const kind)
+{
+    const struct hm2_md *const rx = hm2_idrom_find(setup->idrom, kind->rx_gtag);
+    if (!rx || rx->instances < module->instances)
+        return hm2_diag_add(setup->diag, HM2_ERR_MISMATCH, "%s: the firmware has %u %s transmitters and %u receivers",
+                            setup->prefix, module->md->instances, kind->title, rx ? rx->instances : 0);
+    struct hm2_serial **const ports = hm2_setup_alloc(setup, module->instances * sizeof(struct hm2_serial *));
+    if (!ports)
+        return HM2_ERR_NOMEM;
+    for (unsigned unit = 0; unit < module->instances; unit++) {
+        struct hm2_serial *const port = ports[unit] = hm2_setup_alloc(setup, kind->size);
+        if (!port)
+            return HM2_ERR_NOMEM;
+        port->ops = kind->ops;
+        port->plan = setup->plan;
+        port->clock_hz = module->md->clock_hz;
+        locate(port, module->md, rx, unit, kind->unit_stride);
+    }
+    module->context = ports;
+    const int err = hm2_claim_pins(module, setup, HM2_GTAG_NONE, module->instances, false, NULL);
+    return err ? err : hm2_claim_pins(module, setup, kind->rx_gtag, module->instances, false, NULL);
+}
+
+int serial_setup_receiver(struct hm2_module *const module, struct hm2_setup *const setup)
+{
+    (void)module;
+    (void)setup;
+    return 0;
+}
+
+struct hm2_serial *serial_port(const struct hm2_module *const module, const unsigned unit)
+{
+    struct hm2_serial *const *const ports = module->context;
+    return ports && unit < module->instances ? ports[unit] : NULL;
+}
+
+static struct hm2_serial *open_port(const struct hm2_module *const module, const unsigned unit)
+{
+    struct hm2_serial *const port = serial_port(module, unit);
+    return port && port->open ? port : NULL;
+}
+
+void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
+{
+    (void)cycle;
+    for (unsigned unit = 0; unit < module->instances; unit++) {
+        struct hm2_serial *const port = open_port(module, unit);
+        if (!port || !port->awaiting)
+            continue;
+        port->awaiting = false;
+        if (!port->resend)
+            port->counts.tx_bytes += port->sent_bytes;
+        port->ops->take(port);
+        if (!port->resend)
+            port->sent_bytes = 0;
+    }
+}
+
+void serial_late(struct hm2_module *const module, const uint64_t request)
+{
+    for (unsigned unit = 0; unit < module->instances; unit++) {
+        struct hm2_serial *const port = open_port(module, unit);
+        if (port)
+            port->ops->late(port, request);
+    }
+}
+
+void serial_write_lost(struct hm2_module *const module)
+{
+    for (unsigned unit = 0; unit < module->instances; unit++) {
+        struct hm2_serial *const port = open_port(module, unit);
+        if (port)
+            port->resend = port->sent_bytes > 0;
+    }
+}
+
+/* Nobody knows what the card sent. */
+static void miss(struct hm2_serial *const port)
+{
+    port->counts.tx_uncertain += port->sent_bytes;
+    port->sent_bytes = 0;
+    port->resend = false;
+    port->ops->miss(port);
+}
+
+void serial_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
+{
+    (void)cycle;
+    for (unsigned unit = 0; unit < module->instances; unit++) {
+        struct hm2_serial *const port = open_port(module, unit);
+        if (!port)
+            continue;
+        if (port->awaiting)
+            miss(port);
+        if (!port->resend)
+            port->ops->send(port);
+        port->resend = false;
+        port->ops->ask(port);
+        port->awaiting = true;
+    }
 }

@@ -53,25 +53,58 @@ struct queue_place queue_place(struct queue *queue, unsigned words, unsigned n);
 /* ---- a port ---------------------------------------------------------------------------------------------------------
  */
 
+enum { SERIAL_DATA, SERIAL_COUNT, SERIAL_RATE, SERIAL_MODE, SERIAL_REGISTERS };
+
 struct hm2_serial {
     const struct serial_ops *ops;
     struct hm2_plan *plan;
     double clock_hz;
+    uint16_t tx_reg[SERIAL_REGISTERS], rx_reg[SERIAL_REGISTERS];
     bool open;
+    bool awaiting;       /* a write and a request with our words are on their way */
+    bool resend;         /* the last write was lost: the same again */
+    unsigned sent_bytes; /* in the last write, until it is known to have arrived */
     struct hm2_serial_settings settings;
     struct ring tx, rx;
     struct hm2_serial_counts counts;
 };
 
+/* In the order of a cycle; all but the first two are called for open ports only. */
 struct serial_ops {
     int (*open)(struct hm2_serial *port, struct hm2_diag *diag);
     int (*set)(struct hm2_serial *port, const struct hm2_serial_settings *settings, struct hm2_diag *diag);
+    void (*take)(struct hm2_serial *port);                   /* a fresh reply; what was sent is counted already */
+    void (*late)(struct hm2_serial *port, uint64_t request); /* one that was given up */
+    void (*miss)(struct hm2_serial *port);                   /* no fresh reply since the last write */
+    void (*send)(struct hm2_serial *port);                   /* the next write, unless the last is sent again */
+    void (*ask)(struct hm2_serial *port);                    /* the next request */
 };
 
 /* Checks what both kinds have in common. */
 int serial_check(const struct hm2_serial *port, const struct hm2_serial_settings *settings, struct hm2_diag *diag);
 uint32_t serial_rate(const struct hm2_serial *port, uint32_t baud, unsigned bits);
-struct hm2_serial *uart_port(const struct hm2_module *module, unsigned unit);
-struct hm2_serial *pktuart_port(const struct hm2_module *module, unsigned unit);
+
+/* ---- the ports of a module ------------------------------------------------------------------------------------------
+ */
+
+struct serial_kind {
+    const char *title;
+    uint8_t rx_gtag;
+    size_t size;          /* of a port of this kind, which begins with its struct hm2_serial */
+    unsigned unit_stride; /* bytes between units; 0 = what the descriptor says */
+    const struct serial_ops *ops;
+};
+
+/* Allocate the ports, with the receiver of each transmitter's number, and claim their pins. */
+int serial_setup(struct hm2_module *module, struct hm2_setup *setup, const struct serial_kind *kind);
+/* The receiver belongs to the transmitter of its number, which sets both up. */
+int serial_setup_receiver(struct hm2_module *module, struct hm2_setup *setup);
+/* NULL when there is none. */
+struct hm2_serial *serial_port(const struct hm2_module *module, unsigned unit);
+
+void serial_unpack(struct hm2_module *module, const struct hm2_cycle *cycle);
+void serial_pack(struct hm2_module *module, const struct hm2_cycle *cycle);
+void serial_write_lost(struct hm2_module *module);
+void serial_late(struct hm2_module *module, uint64_t request);
 
 #endif

@@ -14,6 +14,7 @@ struct loop {
     enum hm2_parity parity;
     enum hm2_serial_drive drive;
     size_t bytes;
+    unsigned burst, every; /* bytes that the world outside sends at once, every so many periods */
 };
 
 struct peer {
@@ -47,17 +48,24 @@ static struct hm2_serial *open_port(struct sim_bench *bench, const struct loop *
     return port;
 }
 
-static size_t run_loop(const struct loop *loop, struct hm2_serial_counts *counts)
+/* With HM2_SERIAL_BYTES in the environment as much as that goes round: 10000000 takes some minutes. */
+static size_t bytes_of(const struct loop *loop)
+{
+    const char *const wanted = getenv("HM2_SERIAL_BYTES");
+    return wanted ? strtoul(wanted, NULL, 10) : loop->bytes;
+}
+
+static size_t run_loop(const struct loop *loop, const size_t total, struct hm2_serial_counts *counts)
 {
     struct sim_bench *const bench = sim_bench_new("7i80hd-16", loop->firmware, "");
     struct hm2_serial *const port = open_port(bench, loop);
     struct peer peer = {bench, loop->gtag};
     size_t put = 0, got = 0, idle = 0;
     assert_int_equal(sim_card_serial(bench->card, loop->gtag, 0, echo, &peer), 0);
-    while (got < loop->bytes && idle < 200) {
+    while (got < total && idle < 200) {
         uint8_t bytes[512];
         size_t n = 0;
-        for (; n < sizeof bytes && put + n < loop->bytes; n++)
+        for (; n < sizeof bytes && put + n < total; n++)
             bytes[n] = pattern(put + n);
         put += hm2_serial_put(port, bytes, n);
         sim_bench_cycle(bench);
@@ -75,18 +83,18 @@ static size_t run_loop(const struct loop *loop, struct hm2_serial_counts *counts
 static void a_loop_brings_every_byte_back(void **state)
 {
     static const struct loop rows[] = {
-        {"SVUA8_8_72", HM2_SERIAL_UART, HM2_GTAG_UART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000},
-        {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000},
-        {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 30000},
-        {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_ODD, HM2_DRIVE_AUTO, 6000},
-        {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_EVEN, HM2_DRIVE_ON, 30000},
+        {"SVUA8_8_72", HM2_SERIAL_UART, HM2_GTAG_UART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000, 0, 1},
+        {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000, 0, 1},
+        {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 30000, 0, 1},
+        {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_ODD, HM2_DRIVE_AUTO, 6000, 0, 1},
+        {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_EVEN, HM2_DRIVE_ON, 30000, 0, 1},
     };
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct hm2_serial_counts counts;
-        const size_t got = run_loop(&rows[i], &counts);
-        if (got != rows[i].bytes || counts.rx_errors || counts.rx_overruns || counts.rx_uncertain)
-            fail_msg("row %zu: %zu of %zu bytes, errors %u, overruns %u, uncertain %u, sent %u", i, got, rows[i].bytes,
+        const size_t total = bytes_of(&rows[i]), got = run_loop(&rows[i], total, &counts);
+        if (got != total || counts.rx_errors || counts.rx_overruns || counts.rx_uncertain)
+            fail_msg("row %zu: %zu of %zu bytes, errors %u, overruns %u, uncertain %u, sent %u", i, got, total,
                      counts.rx_errors, counts.rx_overruns, counts.rx_uncertain, counts.tx_bytes);
     }
 }
@@ -94,7 +102,7 @@ static void a_loop_brings_every_byte_back(void **state)
 static void settings_that_the_firmware_cannot_keep_are_refused(void **state)
 {
     static const struct loop old = {
-        "PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 9600, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 0};
+        "PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 9600, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 0, 0, 1};
     (void)state;
     struct sim_bench *const bench = sim_bench_new("7i80hd-16", old.firmware, "");
     struct hm2_serial *const port = open_port(bench, &old);
@@ -117,7 +125,7 @@ static void settings_that_the_firmware_cannot_keep_are_refused(void **state)
 static void a_full_ring_takes_no_more(void **state)
 {
     static const struct loop off = {
-        "PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 9600, HM2_PARITY_NONE, HM2_DRIVE_OFF, 0};
+        "PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 9600, HM2_PARITY_NONE, HM2_DRIVE_OFF, 0, 0, 1};
     (void)state;
     static const uint8_t bytes[1000];
     struct sim_bench *const bench = sim_bench_new("7i80hd-16", off.firmware, "");
@@ -135,8 +143,10 @@ static void a_full_ring_takes_no_more(void **state)
 
 struct weather {
     struct sim_bench *bench;
+    const struct loop *loop;
     unsigned cycle;
-    bool loses;
+    bool loses, loses_requests;
+    size_t put;
 };
 
 /* Every fifth reply comes a period late, sometimes two in a row; one in a hundred never does. */
@@ -155,17 +165,35 @@ static void blow(void *context, const uint8_t *data, size_t len, bool done)
     assert_int_equal(sim_net_set_faults(w->bench->net, &faults), 0);
 }
 
-static void cycle_in(struct weather *w)
+/* The world outside sends numbered bytes, now soon and now late in a period: it has a clock of its own. */
+static bool send_burst(struct weather *w)
 {
-    static const struct sim_faults calm = {.seed = 1};
+    const struct loop *const loop = w->loop;
+    bool sent = false;
+    sim_net_sleep_until(w->bench->net, w->bench->now_ns + w->cycle * 137u % 500u * 1000);
+    const unsigned burst = w->cycle % loop->every == 0 ? loop->burst : 0;
+    for (unsigned i = 0; i < burst && w->put < loop->bytes; i++, w->put++, sent = true) {
+        const uint8_t byte = (uint8_t)w->put;
+        assert_int_equal(sim_card_serial_put(w->bench->card, loop->gtag, 0, &byte, 1), 1);
+    }
+    return sent;
+}
+
+static bool cycle_in(struct weather *w)
+{
+    static const struct sim_faults calm = {.seed = 1}, gale = {.seed = 1, .loss = 1.0};
     struct sim_bench *const bench = w->bench;
     w->cycle++;
+    if (w->loses_requests && w->cycle % 100 == 50)
+        assert_int_equal(sim_net_set_faults(bench->net, &gale), 0);
     hm2_board_read(bench->board, BENCH_PERIOD_NS);
     assert_int_equal(sim_net_set_faults(bench->net, &calm), 0);
     hm2_board_write(bench->board, BENCH_PERIOD_NS);
+    const bool sent = send_burst(w);
     bench->now_ns += BENCH_PERIOD_NS;
     sim_net_sleep_until(bench->net, bench->now_ns);
     assert_int_equal(sim_net_set_faults(bench->net, &calm), 0);
+    return sent;
 }
 
 static void ignore(void *context, uint8_t byte)
@@ -175,53 +203,54 @@ static void ignore(void *context, uint8_t byte)
 }
 
 struct outcome {
-    size_t got, end; /* bytes; place behind the last of them in what was sent */
-    uint64_t lost_replies;
+    size_t got, end; /* bytes; place behind the last of them in what was sent, as far as 256 numbers tell */
+    unsigned jumps;  /* where a byte is not followed by the next one */
+    uint64_t lost_requests, lost_replies;
     struct hm2_serial_counts counts;
 };
 
-/* The world outside sends `bytes` numbers of its own, 8 a period: the rest of it ends the frame. */
-static struct outcome receive_in(const struct loop *loop, const bool loses)
+static struct outcome receive_in(const struct loop *loop, const bool loses, const bool loses_requests)
 {
     struct sim_bench *const bench = sim_bench_new("7i80hd-16", loop->firmware, "");
     struct hm2_serial *const port = open_port(bench, loop);
-    struct weather w = {bench, 0, loses};
+    struct weather w = {.bench = bench, .loop = loop, .loses = loses, .loses_requests = loses_requests};
     assert_int_equal(sim_card_serial(bench->card, loop->gtag, 0, ignore, NULL), 0);
     struct outcome out = {0};
     for (unsigned i = 0; i < 20; i++)
         sim_bench_cycle(bench);
     sim_net_on_taken(bench->net, blow, &w);
-    size_t put = 0;
-    for (unsigned idle = 0; idle < 50; idle++) {
+    for (unsigned idle = 0; idle < 150; idle++) {
         uint8_t bytes[512];
-        for (unsigned i = 0; i < 8 && put < loop->bytes; i++, put++, idle = 0) {
-            const uint8_t byte = (uint8_t)put;
-            assert_int_equal(sim_card_serial_put(bench->card, loop->gtag, 0, &byte, 1), 1);
-        }
-        cycle_in(&w);
-        const size_t n = hm2_serial_get(port, bytes, sizeof bytes);
-        /* Bytes are numbered modulo 256: one that is repeated or out of order takes the end beyond what was sent. */
-        for (size_t i = 0; i < n; i++)
-            out.end += (uint8_t)(bytes[i] - (uint8_t)out.end) + 1u;
-        out.got += n;
+        if (cycle_in(&w))
+            idle = 0;
+        for (size_t n; (n = hm2_serial_get(port, bytes, sizeof bytes)) > 0; out.got += n)
+            for (size_t i = 0; i < n; i++) {
+                const uint8_t ahead = (uint8_t)(bytes[i] - (uint8_t)out.end);
+                out.jumps += ahead != 0;
+                out.end += ahead + 1u; /* repeated or out of order: the end goes beyond what was sent */
+            }
     }
     out.counts = hm2_serial_counts(port);
+    out.lost_requests = sim_net_truth(bench->net).lost[0];
     out.lost_replies = sim_net_truth(bench->net).lost[1];
     sim_bench_free(bench);
     return out;
 }
 
 static const struct loop stormy[] = {
-    {"SVUA8_8_72", HM2_SERIAL_UART, HM2_GTAG_UART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000},
-    {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000},
-    {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_EVEN, HM2_DRIVE_ON, 6000},
+    {"SVUA8_8_72", HM2_SERIAL_UART, HM2_GTAG_UART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000, 8, 1},
+    {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_AUTO, 6000, 8, 1},
+    {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_EVEN, HM2_DRIVE_ON, 6000, 8, 1},
+    {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 60000, 77, 1},
+    {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 60000, 150, 7},
+    {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_ON, 9000, 29, 9},
 };
 
 static void late_replies_cost_no_byte(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof stormy / sizeof stormy[0]; i++) {
-        const struct outcome out = receive_in(&stormy[i], false);
+        const struct outcome out = receive_in(&stormy[i], false, false);
         if (out.got != stormy[i].bytes || out.end != stormy[i].bytes || out.counts.rx_uncertain ||
             out.counts.rx_overruns)
             fail_msg("row %zu: %zu bytes, end %zu, uncertain %u, overruns %u", i, out.got, out.end,
@@ -232,15 +261,32 @@ static void late_replies_cost_no_byte(void **state)
 static void lost_replies_are_counted_and_what_arrives_is_in_order(void **state)
 {
     (void)state;
-    for (size_t i = 0; i < 2; i++) { /* hm2_pty(9) tells what is not kept at 1 Mbaud */
-        const struct outcome out = receive_in(&stormy[i], true);
+    for (size_t i = 0; i < sizeof stormy / sizeof stormy[0]; i++) {
+        const struct outcome out = receive_in(&stormy[i], true, false);
         const size_t missing = stormy[i].bytes - out.got;
-        if (out.lost_replies == 0 || missing == 0 || out.end > stormy[i].bytes || stormy[i].bytes - out.end > 100 ||
-            out.counts.rx_uncertain == 0)
-            fail_msg("row %zu: %zu bytes, end %zu, uncertain %u, replies lost %u", i, out.got, out.end,
-                     out.counts.rx_uncertain, (unsigned)out.lost_replies);
-        if (stormy[i].kind == HM2_SERIAL_UART && missing > out.counts.rx_uncertain)
-            fail_msg("%zu bytes are missing, %u counted", missing, out.counts.rx_uncertain);
+        if (out.lost_replies == 0 || missing == 0 || out.end > stormy[i].bytes || out.jumps > out.lost_replies ||
+            missing > out.counts.rx_uncertain || out.counts.rx_overruns > 0)
+            fail_msg("row %zu: %zu bytes, end %zu, jumps %u, uncertain %u, overruns %u, replies lost %u", i, out.got,
+                     out.end, out.jumps, out.counts.rx_uncertain, out.counts.rx_overruns, (unsigned)out.lost_replies);
+        /* When the line rests between messages the count is exact, but for the end of a frame of unknown length. */
+        if (stormy[i].every > 1 && out.counts.rx_uncertain - missing > 3u * out.lost_replies)
+            fail_msg("row %zu: %zu bytes are missing, %u counted, %u replies lost", i, missing, out.counts.rx_uncertain,
+                     (unsigned)out.lost_replies);
+    }
+}
+
+/* Sizes or words that were not given are still there. */
+static void a_lost_request_costs_a_packet_uart_that_rests_nothing(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof stormy / sizeof stormy[0]; i++) {
+        if (stormy[i].every == 1)
+            continue;
+        const struct outcome out = receive_in(&stormy[i], false, true);
+        if (out.lost_requests == 0 || out.got != stormy[i].bytes || out.jumps || out.counts.rx_uncertain ||
+            out.counts.rx_overruns)
+            fail_msg("row %zu: %zu bytes, jumps %u, uncertain %u, overruns %u, requests lost %u", i, out.got, out.jumps,
+                     out.counts.rx_uncertain, out.counts.rx_overruns, (unsigned)out.lost_requests);
     }
 }
 
@@ -251,6 +297,7 @@ int main(void)
         cmocka_unit_test(settings_that_the_firmware_cannot_keep_are_refused),
         cmocka_unit_test(a_full_ring_takes_no_more),
         cmocka_unit_test(late_replies_cost_no_byte),
+        cmocka_unit_test(a_lost_request_costs_a_packet_uart_that_rests_nothing),
         cmocka_unit_test(lost_replies_are_counted_and_what_arrives_is_in_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -31,12 +31,17 @@ struct hm2_serial_settings {
     unsigned tx_gap_bits, rx_gap_bits; /* PktUART, 11..255: between frames. The receiver's counts on during a byte */
 };
 
-/* What was lost, and why. */
+/*
+ * What was lost, and why. What arrives is in order always, and bytes received + rx_uncertain are never fewer than were
+ * sent to the port, unless the card's buffers ran over. For a PktUART on a line that rests for some periods they are as
+ * many, but that the last word of a frame whose size was lost counts as four bytes; without such a rest the receiver is
+ * cleared, which counts as 2047 bytes.
+ */
 struct hm2_serial_counts {
     uint32_t rx_bytes, tx_bytes;
-    uint32_t rx_errors;    /* false starts, missing stop bits, wrong parity; frames dropped after a lost reply */
+    uint32_t rx_errors;    /* false starts, missing stop bits, wrong parity */
     uint32_t rx_overruns;  /* the card's buffers ran over, or no longer made sense, and were cleared */
-    uint32_t rx_uncertain; /* bytes that the card may have given in a reply that was lost (late ones are used) */
+    uint32_t rx_uncertain; /* bytes that may have been lost with a reply, at most (late replies are used) */
     uint32_t tx_uncertain; /* bytes of which nobody knows whether they were sent, for the same reason */
 };
 

@@ -1,0 +1,343 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "pktuart_rx.h"
+
+#define DATA_BLOCKS    6u
+#define WORDS          63u
+#define COUNT_BLOCKS   3u
+#define COUNTS         7u
+#define STATES         2u
+#define SIZE_MASK      0x3FFu
+#define SIZE_ERRORS    (7u << 14)
+#define MODE_FRAMES(m) ((m) >> 16 & 0x1Fu)
+#define MODE_DATA      (1u << 21)
+#define MODE_ACTIVE    (1u << 7)
+#define MODE_ERROR     (1u << 4)
+#define WORD_BYTES     4u
+#define VAIN_MAX       8u
+#define CLEAR_BYTES    (1024u + 1023u) /* a full buffer, and a frame */
+
+static unsigned smaller(const unsigned a, const unsigned b)
+{
+    return a < b ? a : b;
+}
+
+static unsigned words_of(const unsigned bytes)
+{
+    return (bytes + WORD_BYTES - 1u) / WORD_BYTES;
+}
+
+int pkt_rx_add(struct pkt_rx *const rx, const struct hm2_serial *const port, struct hm2_diag *const diag)
+{
+    rx->data.fifo = port->rx_reg[SERIAL_DATA];
+    rx->counts.fifo = port->rx_reg[SERIAL_COUNT];
+    rx->data.nowhere = rx->counts.nowhere = port->rx_reg[SERIAL_RATE]; /* to read it does nothing */
+    int err = queue_add_reads(&rx->data, port->plan, DATA_BLOCKS, diag);
+    if (!err)
+        err = queue_add_reads(&rx->counts, port->plan, COUNT_BLOCKS, diag);
+    if (!err)
+        err = hm2_plan_add_queue_read(port->plan, &rx->state, port->rx_reg[SERIAL_MODE], STATES, diag);
+    return err;
+}
+
+/* ---- frames -------------------------------------------------------------------------------------------------------
+ */
+
+static void add_frame(struct pkt_rx *const rx, const unsigned bytes)
+{
+    rx->size[(rx->first + rx->frames++) % PKT_RX_FRAMES] = (uint16_t)bytes;
+}
+
+/* Bytes in the next word of the oldest frame, which is taken from it. */
+static unsigned next_word(struct pkt_rx *const rx)
+{
+    uint16_t *const size = &rx->size[rx->first];
+    const unsigned len = rx->frames > 0 ? smaller(*size, WORD_BYTES) : 0;
+    *size = (uint16_t)(*size - len);
+    if (len > 0 && *size == 0) {
+        rx->first = (rx->first + 1u) % PKT_RX_FRAMES;
+        rx->frames--;
+    }
+    return len;
+}
+
+static unsigned frame_words(const struct pkt_rx *const rx)
+{
+    unsigned words = 0;
+    for (unsigned i = 0; i < rx->frames; i++)
+        words += words_of(rx->size[(rx->first + i) % PKT_RX_FRAMES]);
+    return words;
+}
+
+static unsigned frame_bytes(const struct pkt_rx *const rx)
+{
+    unsigned bytes = 0;
+    for (unsigned i = 0; i < rx->frames; i++)
+        bytes += rx->size[(rx->first + i) % PKT_RX_FRAMES];
+    return bytes;
+}
+
+/* The next word of the oldest frame, for the port or only counted. */
+static void hand_over(struct pkt_rx *const rx, struct hm2_serial *const port, const uint32_t word, const bool good)
+{
+    uint8_t bytes[WORD_BYTES];
+    const unsigned frames = rx->frames;
+    const bool keep = good && !rx->skips;
+    const unsigned len = next_word(rx);
+    rx->skips = rx->skips && rx->frames == frames;
+    hm2_put_le32(bytes, word);
+    if (keep)
+        port->counts.rx_bytes += (uint32_t)ring_put(&port->rx, bytes, len);
+    else
+        port->counts.rx_uncertain += len;
+}
+
+static void deliver(struct pkt_rx *const rx, struct hm2_serial *const port, const uint32_t word)
+{
+    hand_over(rx, port, word, true);
+}
+
+/* ---- after a loss -------------------------------------------------------------------------------------------------
+ */
+
+/* What was asked for will not come any more. */
+static void lose(struct pkt_rx *const rx)
+{
+    struct pkt_hunt *const hunt = &rx->hunt;
+    if (!hunt->on) {
+        hunt->on = true;
+        hunt->losses = hunt->lost_sizes = hunt->lost_words = hunt->taken_words = hunt->held = 0;
+        hunt->surplus = 0;
+        hunt->vain = 0;
+        hunt->known_words = hunt->lost_at = frame_words(rx);
+        hunt->known_bytes = frame_bytes(rx);
+    }
+    hunt->losses++;
+    hunt->lost_sizes += rx->asked_counts;
+    hunt->lost_words += rx->asked_words;
+    hunt->surplus -= (int)rx->asked_words;
+    rx->asked_words = rx->asked_counts = 0;
+    rx->unanswered = false;
+}
+
+static int taken_beyond(const struct pkt_hunt *const hunt)
+{
+    return (int)hunt->taken_words - (int)hunt->known_words;
+}
+
+/* The line rests: a word that is there belongs to a frame that has ended. */
+static void note_surplus(struct pkt_hunt *const hunt)
+{
+    const int least = taken_beyond(hunt) + 1;
+    if (hunt->surplus >= least)
+        return;
+    hunt->surplus = least;
+    hunt->vain = 0;
+}
+
+/* One request for words alone: it has taken all of them or none, so one word too many tells. */
+static bool did_not_arrive(const struct pkt_hunt *const hunt)
+{
+    return hunt->losses == 1 && hunt->lost_sizes == 0 && hunt->surplus > -(int)hunt->lost_words;
+}
+
+static void hold_word(struct pkt_hunt *const hunt, const uint32_t word)
+{
+    if (hunt->held < PKT_RX_HOLD_WORDS)
+        hunt->hold[hunt->held++] = word;
+    hunt->taken_words++;
+}
+
+/* A line that never rests for long enough, or more than can be held. */
+static bool is_hopeless(const struct pkt_rx *const rx)
+{
+    return rx->hunt.vain > VAIN_MAX || rx->hunt.held == PKT_RX_HOLD_WORDS || rx->frames + COUNTS > PKT_RX_FRAMES;
+}
+
+static void release(struct pkt_rx *const rx, struct hm2_serial *const port, const unsigned from, const unsigned to)
+{
+    for (unsigned i = from; i < to; i++)
+        deliver(rx, port, rx->hunt.hold[i]);
+}
+
+/* What is known to have been received does not reach the port. */
+static void give_up(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    const struct pkt_hunt *const hunt = &rx->hunt;
+    const unsigned most = hunt->taken_words + hunt->lost_words;
+    port->counts.rx_uncertain += hunt->known_bytes;
+    if (hunt->lost_sizes > 0 && most > hunt->known_words)
+        port->counts.rx_uncertain += WORD_BYTES * (most - hunt->known_words);
+    rx->frames = 0;
+}
+
+/* Everything that the card had is here: what is missing? The last word of a frame whose size was lost holds one byte to
+ * four: it counts as four. */
+static void resolve(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    struct pkt_hunt *const hunt = &rx->hunt;
+    const int beyond = taken_beyond(hunt);
+    const unsigned extra = beyond > 0 ? (unsigned)beyond : 0, missing = beyond < 0 ? (unsigned)-beyond : 0;
+    hunt->on = false;
+    if (hunt->losses > 1 || (missing > 0 && missing != hunt->lost_words) || hunt->lost_at + extra > hunt->held ||
+        (extra > 0 && hunt->lost_sizes == 0)) {
+        give_up(rx, port);
+        return;
+    }
+    for (unsigned i = 0; i < missing; i++)
+        hand_over(rx, port, 0, false);
+    if (extra > 0) {
+        port->counts.rx_uncertain += WORD_BYTES * extra;
+        release(rx, port, 0, hunt->lost_at);
+    }
+    release(rx, port, extra > 0 ? hunt->lost_at + extra : 0, hunt->held);
+}
+
+static void learn(struct pkt_rx *const rx, struct hm2_serial *const port, const bool data)
+{
+    struct pkt_hunt *const hunt = &rx->hunt;
+    if (!data) {
+        resolve(rx, port);
+        return;
+    }
+    note_surplus(hunt);
+    if (!did_not_arrive(hunt))
+        return;
+    hunt->on = false;
+    release(rx, port, 0, hunt->held);
+}
+
+void pkt_rx_forget(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    if (rx->hunt.on)
+        give_up(rx, port);
+    else
+        port->counts.rx_uncertain += frame_bytes(rx);
+    rx->hunt.on = rx->unanswered = rx->skips = false;
+    rx->frames = rx->asked_words = rx->asked_counts = 0;
+}
+
+void pkt_rx_clear(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    pkt_rx_forget(rx, port);
+    port->counts.rx_uncertain += CLEAR_BYTES;
+    rx->clearing = rx->skips = true;
+}
+
+/* ---- reply --------------------------------------------------------------------------------------------------------
+ */
+
+static void take_words(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    for (unsigned n = 0; n < rx->asked_words; n++) {
+        const struct queue_place at = queue_place(&rx->data, rx->asked_words, n);
+        const uint32_t word = hm2_window_get(at.window, at.word);
+        if (rx->hunt.on)
+            hold_word(&rx->hunt, word);
+        else
+            deliver(rx, port, word);
+    }
+    rx->asked_words = 0;
+}
+
+static void take_sizes(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    for (unsigned n = 0; n < rx->asked_counts; n++) {
+        const struct queue_place at = queue_place(&rx->counts, rx->asked_counts, n);
+        const uint32_t count = hm2_window_get(at.window, at.word);
+        if (count & SIZE_ERRORS)
+            port->counts.rx_errors++;
+        if ((count & SIZE_MASK) == 0)
+            continue;
+        add_frame(rx, count & SIZE_MASK);
+        rx->hunt.known_words += words_of(count & SIZE_MASK);
+        rx->hunt.known_bytes += count & SIZE_MASK;
+    }
+    rx->asked_counts = 0;
+}
+
+/* At its very end a frame shows neither that it is under way nor its size, for a clock: so the mode is read twice. */
+static void take_state(struct pkt_rx *const rx)
+{
+    const uint32_t before = hm2_window_get(&rx->state, 0);
+    rx->mode = hm2_window_get(&rx->state, 1);
+    rx->still = !((before | rx->mode) & MODE_ACTIVE) && MODE_FRAMES(before) == 0 && MODE_FRAMES(rx->mode) == 0;
+}
+
+static void take_all(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    take_state(rx);
+    take_words(rx, port);
+    take_sizes(rx, port);
+}
+
+enum pkt_rx_health pkt_rx_take(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    if (rx->unanswered)
+        lose(rx);
+    if (rx->clearing) {
+        take_state(rx);
+        return PKT_RX_GOOD;
+    }
+    rx->hunt.vain++;
+    take_all(rx, port);
+    const bool data = (rx->mode & MODE_DATA) != 0;
+    if (rx->hunt.on && rx->still)
+        learn(rx, port, data);
+    const bool left_over = !rx->hunt.on && rx->still && rx->frames == 0 && data;
+    if (left_over || (rx->mode & MODE_ERROR) != 0)
+        return PKT_RX_OVERRUN;
+    return rx->hunt.on && is_hopeless(rx) ? PKT_RX_LOST : PKT_RX_GOOD;
+}
+
+void pkt_rx_late(struct pkt_rx *const rx, struct hm2_serial *const port, const uint64_t request)
+{
+    if (rx->clearing || rx->request != request || (rx->asked_words == 0 && rx->asked_counts == 0))
+        return;
+    take_all(rx, port);
+    rx->unanswered = false;
+}
+
+/* ---- request ------------------------------------------------------------------------------------------------------
+ */
+
+void pkt_rx_miss(struct pkt_rx *const rx)
+{
+    rx->unanswered = rx->asked_words > 0 || rx->asked_counts > 0;
+}
+
+/* Words that are there for certain. A pop beyond them may spoil the card's buffer. */
+static unsigned words_there(const struct pkt_rx *const rx)
+{
+    if (!rx->hunt.on)
+        return frame_words(rx);
+    const int there = rx->hunt.surplus - taken_beyond(&rx->hunt);
+    return there > 0 ? (unsigned)there : rx->mode & MODE_DATA ? 1u : 0u;
+}
+
+/* What is held goes into the ring at once some time. */
+static unsigned room_words(const struct pkt_rx *const rx, const struct hm2_serial *const port)
+{
+    const unsigned room = (RING_BYTES - ring_used(&port->rx)) / WORD_BYTES;
+    const unsigned held = rx->hunt.on ? rx->hunt.held : 0;
+    return room > held ? room - held : 0;
+}
+
+void pkt_rx_ask(struct pkt_rx *const rx, const struct hm2_serial *const port, const bool ready)
+{
+    unsigned words = 0, counts = 0;
+    if (ready && !rx->unanswered) {
+        const unsigned places = PKT_RX_FRAMES - rx->frames;
+        words = smaller(smaller(words_there(rx), room_words(rx, port)), WORDS);
+        counts = smaller(smaller(MODE_FRAMES(rx->mode), COUNTS), places);
+        if (words > 0 && counts > 0 && (words == WORDS || rx->words_next))
+            counts = 0;
+        else if (counts > 0)
+            words = 0;
+        rx->words_next = counts > 0;
+        rx->request = hm2_plan_requests(port->plan) + 1u;
+        rx->asked_words = words;
+        rx->asked_counts = counts;
+    }
+    queue_aim(&rx->data, words);
+    queue_aim(&rx->counts, counts);
+}
