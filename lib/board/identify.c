@@ -121,6 +121,9 @@ int hm2_board_identify(struct hm2_board *const board, struct link *const link, s
     err = hm2_idrom_parse(&board->image, &expect, &board->idrom, diag);
     if (err < 0)
         return err;
+    board->idrom.io_ports = hm2_idrom_ports(&board->idrom);
+    const unsigned usable = board->idrom.io_ports * board->idrom.port_width;
+    board->idrom.pin_count = usable < board->idrom.pin_count ? usable : board->idrom.pin_count;
     if (board->type.stem == board->stem) {
         board->type.io_ports = board->idrom.io_ports;
         board->type.port_width = board->idrom.port_width;
