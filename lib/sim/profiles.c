@@ -198,48 +198,48 @@ static const struct sim_firmware plain_litehm2 = PLAIN("LITEHM2", SLX16, 3, 24);
 #define PART_T20   .part = "T20F256", .efinix = true
 
 /* Where the MAC address starts, and firmware version: of the manual, and of the recorded card. */
-#define BY_MANUAL .eeprom_mac_word = 1, .firmware_version = 17
-#define RECORDED  .eeprom_mac_word = 0, .firmware_version = 15
+#define ORIGIN_MANUAL   .eeprom_mac_word = 1, .firmware_version = 17
+#define ORIGIN_RECORDED .eeprom_mac_word = 0, .firmware_version = 15
 
-#define CARDS(CARD)                                                                      \
-    CARD("7i96s", "7I96S", T20, BY_MANUAL, firmware_7i96s)                               \
-    CARD("7i96s_7i77d", "7I96S", T20, BY_MANUAL, firmware_7i96s_7i77d)                   \
-    CARD("7i93", "7I93", SLX9, BY_MANUAL, firmware_7i93)                                 \
-    CARD("7i93_svst4_8", "7I93", SLX9, BY_MANUAL, sim_firmware_7i93_svst4_8)             \
-    CARD("7i93_svst8_8im2", "7I93", SLX9, BY_MANUAL, sim_firmware_7i93_svst8_8im2)       \
-    CARD("7i93_svst1_4_7i47s", "7I93", SLX9, BY_MANUAL, sim_firmware_7i93_svst1_4_7i47s) \
-    CARD("7i93_2x7i65", "7I93", SLX9, BY_MANUAL, sim_firmware_7i93_2x7i65)               \
-    CARD("7i93_sv12im_2x7i48", "7I93", SLX9, BY_MANUAL, sim_firmware_7i93_sv12im_2x7i48) \
-    CARD("7i93_sv6_7i49", "7I93", SLX9, BY_MANUAL, sim_firmware_7i93_sv6_7i49)           \
-    CARD("7i76e", "7I76E-16", SLX16, BY_MANUAL, plain_7i76e)                             \
-    CARD("7i76eu", "7I76EU", T20, BY_MANUAL, plain_7i76eu)                               \
-    CARD("7i80db-16", "7I80DB-16", SLX16, BY_MANUAL, plain_7i80db_16)                    \
-    CARD("7i80db-25", "7I80DB-25", SLX25, BY_MANUAL, plain_7i80db_25)                    \
-    CARD("7i80hd-16", "7I80HD-16", SLX16, RECORDED, plain_7i80hd_16)                     \
-    CARD("7i80hd-25", "7I80HD-25", SLX25, BY_MANUAL, plain_7i80hd_25)                    \
-    CARD("7i80hdt", "7I80HDT", T20, BY_MANUAL, plain_7i80hdt)                            \
-    CARD("7i92", "7I92", SLX9, BY_MANUAL, plain_7i92)                                    \
-    CARD("7i92t", "7I92T", T20, BY_MANUAL, plain_7i92t)                                  \
-    CARD("7i94", "7I94", SLX9, BY_MANUAL, plain_7i94)                                    \
-    CARD("7i94t", "7I94T", T20, BY_MANUAL, plain_7i94t)                                  \
-    CARD("7i95", "7I95", SLX9, BY_MANUAL, plain_7i95)                                    \
-    CARD("7i95t", "7I95T", T20, BY_MANUAL, plain_7i95t)                                  \
-    CARD("7i96", "7I96", SLX9, BY_MANUAL, plain_7i96)                                    \
-    CARD("7i97", "7I97", SLX9, BY_MANUAL, plain_7i97)                                    \
-    CARD("7i97t", "7I97T", T20, BY_MANUAL, plain_7i97t)                                  \
-    CARD("7i98", "7I98", SLX9, BY_MANUAL, plain_7i98)                                    \
-    CARD("litehm2", "litehm2", SLX16, BY_MANUAL, plain_litehm2)
+#define CARDS(CARD)                                                                   \
+    CARD("7i96s", "7I96S", T20, MANUAL, firmware_7i96s)                               \
+    CARD("7i96s_7i77d", "7I96S", T20, MANUAL, firmware_7i96s_7i77d)                   \
+    CARD("7i93", "7I93", SLX9, MANUAL, firmware_7i93)                                 \
+    CARD("7i93_svst4_8", "7I93", SLX9, MANUAL, sim_firmware_7i93_svst4_8)             \
+    CARD("7i93_svst8_8im2", "7I93", SLX9, MANUAL, sim_firmware_7i93_svst8_8im2)       \
+    CARD("7i93_svst1_4_7i47s", "7I93", SLX9, MANUAL, sim_firmware_7i93_svst1_4_7i47s) \
+    CARD("7i93_2x7i65", "7I93", SLX9, MANUAL, sim_firmware_7i93_2x7i65)               \
+    CARD("7i93_sv12im_2x7i48", "7I93", SLX9, MANUAL, sim_firmware_7i93_sv12im_2x7i48) \
+    CARD("7i93_sv6_7i49", "7I93", SLX9, MANUAL, sim_firmware_7i93_sv6_7i49)           \
+    CARD("7i76e", "7I76E-16", SLX16, MANUAL, plain_7i76e)                             \
+    CARD("7i76eu", "7I76EU", T20, MANUAL, plain_7i76eu)                               \
+    CARD("7i80db-16", "7I80DB-16", SLX16, MANUAL, plain_7i80db_16)                    \
+    CARD("7i80db-25", "7I80DB-25", SLX25, MANUAL, plain_7i80db_25)                    \
+    CARD("7i80hd-16", "7I80HD-16", SLX16, RECORDED, plain_7i80hd_16)                  \
+    CARD("7i80hd-25", "7I80HD-25", SLX25, MANUAL, plain_7i80hd_25)                    \
+    CARD("7i80hdt", "7I80HDT", T20, MANUAL, plain_7i80hdt)                            \
+    CARD("7i92", "7I92", SLX9, MANUAL, plain_7i92)                                    \
+    CARD("7i92t", "7I92T", T20, MANUAL, plain_7i92t)                                  \
+    CARD("7i94", "7I94", SLX9, MANUAL, plain_7i94)                                    \
+    CARD("7i94t", "7I94T", T20, MANUAL, plain_7i94t)                                  \
+    CARD("7i95", "7I95", SLX9, MANUAL, plain_7i95)                                    \
+    CARD("7i95t", "7I95T", T20, MANUAL, plain_7i95t)                                  \
+    CARD("7i96", "7I96", SLX9, MANUAL, plain_7i96)                                    \
+    CARD("7i97", "7I97", SLX9, MANUAL, plain_7i97)                                    \
+    CARD("7i97t", "7I97T", T20, MANUAL, plain_7i97t)                                  \
+    CARD("7i98", "7I98", SLX9, MANUAL, plain_7i98)                                    \
+    CARD("litehm2", "litehm2", SLX16, MANUAL, plain_litehm2)
 
 /* Addresses: jumpers down/down are 192.168.1.121, the EEPROM ships with 10.10.10.10 (seed 000, "IP ADDRESS"). */
 #define PROFILE(id, card, fpga, origin, image) \
-    {.name = id,                               \
-     .card_name = card,                        \
+    {.name = (id),                             \
+     .card_name = (card),                      \
      .lbp_version = 3,                         \
      .ip = {192, 168, 1, 121},                 \
      .eeprom_ip = {10, 10, 10, 10},            \
      .flash_id = 0x14,                         \
      PART_##fpga,                              \
-     origin,                                   \
+     ORIGIN_##origin,                          \
      .firmware = &(image)},
 #define NAME(id, ...) (id),
 

@@ -35,7 +35,7 @@ struct sim_firmware {
 
 struct sim_profile {
     const char *name;
-    char card_name[17];                     /* EEPROM and space 7 */
+    const char *card_name;                  /* EEPROM and space 7 */
     bool efinix;                            /* undriven bus reads zeros, no boot block; else Xilinx */
     uint16_t lbp_version, firmware_version; /* space 7 (seed 000, "SPACE 7") */
     uint8_t ip[4];                          /* that the card uses as its jumpers say */

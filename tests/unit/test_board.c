@@ -431,8 +431,8 @@ static void pins_are_listed_with_terminal_and_owner(void **state)
     char text[8192];
     const size_t needed = hm2_board_describe_pins(f->board, text, sizeof text);
     assert_int_equal(needed, strlen(text));
-    assert_non_null(strstr(text, "IO Pin 017 (TB1-2/3): StepGen #0, pin Step (Output)\n"));
-    assert_non_null(strstr(text, "IO Pin 050 (P1-13): IOPort\n"));
+    assert_non_null(strstr(text, "IO Pin 017 (TB1-2,3): StepGen #0, pin Step (Output)\n"));
+    assert_non_null(strstr(text, "IO Pin 050 (P1-25/DB25-13): IOPort\n"));
     char little[64];
     assert_int_equal(hm2_board_describe_pins(f->board, little, sizeof little), needed);
     assert_memory_equal(little, text, sizeof little - 1);

@@ -182,10 +182,47 @@ static void every_image_that_was_dumped_loads_and_runs(void **state)
     free(text);
 }
 
+/* ---- cards --------------------------------------------------------------------------------------------------------
+ */
+
+static void check_listing(const struct bench *const b)
+{
+    static char text[16384];
+    const size_t len = hm2_board_describe_pins(b->board, text, sizeof text);
+    assert_true(len < sizeof text);
+    if (strstr(text, "(??"))
+        fail_msg("%s: %s", hm2_board_card_name(b->board), text);
+}
+
+/* Every card of the flash tool's table is simulated under the name that its manual gives it, known, and runs. */
+static void every_card_loads_and_its_pins_have_names(void **state)
+{
+    (void)state;
+    static struct bench b;
+    for (size_t i = 0; flash_board_at(i); i++) {
+        const struct flash_board *const board = flash_board_at(i);
+        const char *const *profile = sim_profiles();
+        while (*profile && strcasecmp(*profile, board->device) != 0)
+            profile++;
+        const struct sim_card_options options = {.profile = *profile};
+        if (load(&b, &options) != 0)
+            fail_msg("%s: %s", board->device, b.diag.text);
+        assert_string_equal(hm2_board_card_name(b.board), board->card_name);
+        assert_null(strstr(b.diag.text, "no card known here"));
+        assert_int_equal(hm2_board_type(b.board)->io_ports, board->io_ports);
+        assert_int_equal(hm2_board_type(b.board)->port_width, board->port_width);
+        check_listing(&b);
+        run(&b, 3);
+        assert_true(point(&b, "packet-error-total") == 0);
+        release(&b);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_image_that_was_dumped_loads_and_runs),
+        cmocka_unit_test(every_card_loads_and_its_pins_have_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
