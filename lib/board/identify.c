@@ -121,12 +121,16 @@ int hm2_board_identify(struct hm2_board *const board, struct link *const link, s
     err = hm2_idrom_parse(&board->image, &expect, &board->idrom, diag);
     if (err < 0)
         return err;
-    if (board->type.stem == board->stem) {
+    board->idrom.io_ports = hm2_idrom_ports(&board->idrom);
+    const unsigned usable = board->idrom.io_ports * board->idrom.port_width;
+    board->idrom.pin_count = usable < board->idrom.pin_count ? usable : board->idrom.pin_count;
+    if (board->type.io_ports == 0) {
         board->type.io_ports = board->idrom.io_ports;
         board->type.port_width = board->idrom.port_width;
+    }
+    if (board->type.stem == board->stem)
         hm2_diag_warn(diag, "\"%s\" is no card known here; its connectors' names are not known either",
                       board->card_name);
-    }
     board->state = BOARD_IDENTIFIED;
     return 0;
 }

@@ -2,6 +2,8 @@
 /* The pins of a card with their terminals and owners, as printed at load. */
 #include <stdio.h>
 
+#include <hm2/terminals.h>
+
 #include "board_private.h"
 
 static void terminal(const struct hm2_board *const board, const unsigned io, char *const text, const size_t size)
@@ -9,12 +11,14 @@ static void terminal(const struct hm2_board *const board, const unsigned io, cha
     const struct hm2_board_type *const type = &board->type;
     const unsigned width = board->idrom.port_width;
     const unsigned port = width ? io / width : 0;
-    const unsigned connectors = sizeof type->connectors / sizeof type->connectors[0];
-    if (type->terminals && io < type->io_ports * type->port_width)
-        (void)snprintf(text, size, "%s", type->terminals[io]);
+    const unsigned pin = width ? io % width : 0;
+    const bool known = port < HM2_BOARD_CONNECTORS;
+    const struct hm2_terminals *const terminals =
+        known && type->terminals[port] ? hm2_terminals_find(type->terminals[port]) : NULL;
+    if (terminals && pin < terminals->count)
+        (void)snprintf(text, size, "%s", terminals->terminals[pin]);
     else
-        (void)snprintf(text, size, "%s-%02u",
-                       port < connectors && type->connectors[port] ? type->connectors[port] : "??",
+        (void)snprintf(text, size, "%s-%02u", known && type->connectors[port] ? type->connectors[port] : "??",
                        hm2_connector_pin(width, io));
 }
 

@@ -124,34 +124,60 @@ static bool is_variant(const struct hm2_module_type *const type, const struct hm
     return type->variant_count == 0;
 }
 
-static int refuse_variant(const struct hm2_board *const board, const struct hm2_module_type *const type,
-                          const struct hm2_md *const md, struct hm2_diag *const diag)
+/* What the card cannot be driven without, and what the load line asks for by number. */
+static bool is_needed(const struct hm2_board *const board, const struct hm2_module_type *const type)
 {
-    char expected[512] = "";
+    return type->gtag == HM2_GTAG_WATCHDOG || type->gtag == HM2_GTAG_IOPORT ||
+           (type->config_count >= 0 && type->config_count < (int)HM2_CFG_COUNTS &&
+            board->config.count[type->config_count] > 0);
+}
+
+/* A module that cannot be driven: an error where it is needed, else it is left alone, as unknown tags are. */
+static int leave_alone(const struct hm2_board *const board, const struct hm2_module_type *const type,
+                       const char *const sentence, struct hm2_diag *const diag)
+{
+    if (is_needed(board, type))
+        return hm2_diag_add(diag, HM2_ERR_MISMATCH, "%s: %s", board->prefix, sentence);
+    hm2_diag_warn(diag, "%s: %s; it is left alone", board->prefix, sentence);
+    return 0;
+}
+
+static int leave_variant(const struct hm2_board *const board, const struct hm2_module_type *const type,
+                         const struct hm2_md *const md, struct hm2_diag *const diag)
+{
+    char expected[512] = "", sentence[768];
     size_t used = 0;
     for (size_t i = 0; i < type->variant_count && used < sizeof expected; i++) {
         const struct hm2_md_variant *const v = &type->variants[i];
         used += (size_t)snprintf(expected + used, sizeof expected - used, "%s0x%02X/%u/%u/0x%X", i ? " or " : "",
                                  v->version, v->registers, (unsigned)v->instance_stride, (unsigned)v->multiple);
     }
-    return hm2_diag_add(diag, HM2_ERR_MISMATCH,
-                        "%s: module %s (tag 0x%02X): version/registers/instance stride/register mask "
-                        "0x%02X/%u/%u/0x%X found, expected %s; the firmware does not suit this driver",
-                        board->prefix, hm2_tag_name(md->gtag), md->gtag, md->version, md->registers,
-                        (unsigned)md->instance_stride, (unsigned)md->multiple, expected);
+    (void)snprintf(sentence, sizeof sentence,
+                   "module %s (tag 0x%02X): version/registers/instance stride/register mask 0x%02X/%u/%u/0x%X found, "
+                   "expected %s; the firmware does not suit this driver",
+                   hm2_tag_name(md->gtag), md->gtag, md->version, md->registers, (unsigned)md->instance_stride,
+                   (unsigned)md->multiple, expected);
+    return leave_alone(board, type, sentence, diag);
 }
 
-/* Two types of one HAL name (plain and muxed encoders) would create the same pins. */
-static int refuse_twin(const struct hm2_board *const board, const struct hm2_module_type *const type,
-                       struct hm2_diag *const diag)
+/* Two types of one HAL name (plain and muxed encoders) would create the same pins: the module that has the name, or
+ * NULL. */
+static const struct hm2_module *twin_of(const struct hm2_board *const board, const struct hm2_module_type *const type)
 {
     for (unsigned i = 0; i < board->module_count; i++)
         if (board->modules[i].md && strcmp(board->modules[i].type->name, type->name) == 0)
-            return hm2_diag_add(
-                diag, HM2_ERR_MISMATCH,
-                "%s: the firmware has both %s and %s, which share the name %s; expected only one of them",
-                board->prefix, hm2_tag_name(board->modules[i].md->gtag), hm2_tag_name(type->gtag), type->name);
-    return 0;
+            return &board->modules[i];
+    return NULL;
+}
+
+static int leave_twin(const struct hm2_board *const board, const struct hm2_module_type *const type,
+                      const struct hm2_module *const twin, struct hm2_diag *const diag)
+{
+    char sentence[256];
+    (void)snprintf(sentence, sizeof sentence,
+                   "the firmware has both %s and %s, which share the name %s; only %s is used",
+                   hm2_tag_name(twin->md->gtag), hm2_tag_name(type->gtag), type->name, hm2_tag_name(twin->md->gtag));
+    return leave_alone(board, type, sentence, diag);
 }
 
 static unsigned instances_to_use(const struct hm2_board *const board, const struct hm2_module_type *const type,
@@ -167,10 +193,10 @@ static int add_module(struct hm2_board *const board, const struct hm2_module_typ
                       const struct hm2_md *const md, struct hm2_diag *const diag)
 {
     if (md && !is_variant(type, md))
-        return refuse_variant(board, type, md, diag);
-    const int err = md ? refuse_twin(board, type, diag) : 0;
-    if (err < 0)
-        return err;
+        return leave_variant(board, type, md, diag);
+    const struct hm2_module *const twin = md ? twin_of(board, type) : NULL;
+    if (twin)
+        return leave_twin(board, type, twin, diag);
     if (board->module_count == BOARD_MODULES)
         return hm2_diag_add(diag, HM2_ERR_NOSPACE, "%s: more than %u modules", board->prefix, BOARD_MODULES);
     struct hm2_module *const module = &board->modules[board->module_count++];

@@ -213,6 +213,20 @@ static void check_range(struct parse *const p, const unsigned number, const stru
                   (unsigned long long)(last + 3u));
 }
 
+/* Public firmware exists that contradicts itself here; ports of which either knows nothing are not used. */
+static void check_port_count(struct parse *const p, const unsigned number, const struct hm2_md *const md)
+{
+    const unsigned ports = p->out->io_ports;
+    if (md->instances == 0)
+        VIOLATION(p, "%s: module descriptor %u (IOPort): instances is 0, expected IOPorts of the header, %u", p->board,
+                  number, ports);
+    else if (md->instances != ports)
+        hm2_diag_warn(p->diag,
+                      "%s: module descriptor %u (IOPort): instances is %u, expected IOPorts of the header, %u; the "
+                      "first %u are used",
+                      p->board, number, md->instances, ports, md->instances < ports ? md->instances : ports);
+}
+
 static void check_module(struct parse *const p, const unsigned number, struct hm2_md *const md)
 {
     const struct hm2_idrom *const rom = p->out;
@@ -224,9 +238,8 @@ static void check_module(struct parse *const p, const unsigned number, struct hm
     md->register_stride = check_stride(p, number, md, "register", md->register_stride_selector, rom->register_stride);
     md->instance_stride = check_stride(p, number, md, "instance", md->instance_stride_selector, rom->instance_stride);
     check_range(p, number, md);
-    if (md->gtag == HM2_GTAG_IOPORT && md->instances != rom->io_ports)
-        VIOLATION(p, "%s: module descriptor %u (IOPort): instances is %u, expected IOPorts of the header, %u", p->board,
-                  number, md->instances, (unsigned)rom->io_ports);
+    if (md->gtag == HM2_GTAG_IOPORT)
+        check_port_count(p, number, md);
 }
 
 /* Types a card can have only once: everything that has a driver in LinuxCNC (register map 1.6, check 16). */
@@ -302,14 +315,17 @@ static void decode_pin(const uint32_t word, struct hm2_pd *const pd)
 static void check_pins(struct parse *const p)
 {
     const struct hm2_idrom *const rom = p->out;
-    for (unsigned first = 0; first < rom->pin_count;) {
+    const unsigned ports = hm2_idrom_ports(rom);
+    const uint64_t usable = (uint64_t)ports * rom->port_width;
+    const unsigned count = ports < rom->io_ports && usable < rom->pin_count ? (unsigned)usable : rom->pin_count;
+    for (unsigned first = 0; first < count;) {
         const uint8_t tag = rom->pins[first].primary_tag;
         unsigned last = first;
-        while (last + 1 < rom->pin_count && rom->pins[last + 1].primary_tag == tag)
+        while (last + 1 < count && rom->pins[last + 1].primary_tag == tag)
             last++;
         if (tag != HM2_GTAG_IOPORT)
             VIOLATION(p, "%s: pin descriptors %u to %u: primary tag is 0x%02X%s, expected 0x03 (IOPort) in all %u",
-                      p->board, first, last, tag, tag == 0 ? " (the list is too short)" : "", rom->pin_count);
+                      p->board, first, last, tag, tag == 0 ? " (the list is too short)" : "", count);
         first = last + 1;
     }
 }
@@ -376,4 +392,10 @@ const struct hm2_md *hm2_idrom_find(const struct hm2_idrom *const idrom, const u
         if (idrom->modules[i].gtag == gtag)
             return idrom->modules + i;
     return NULL;
+}
+
+unsigned hm2_idrom_ports(const struct hm2_idrom *const idrom)
+{
+    const struct hm2_md *const md = hm2_idrom_find(idrom, HM2_GTAG_IOPORT);
+    return md && md->instances > 0 && md->instances < idrom->io_ports ? md->instances : idrom->io_ports;
 }

@@ -150,10 +150,6 @@ static int setup_any(struct hm2_module *const module, struct hm2_setup *const se
     const struct hm2_md *const md = module->md;
     if (module->instances == 0)
         return 0;
-    if (hm2_idrom_find(setup->idrom, muxed ? HM2_GTAG_ENCODER : HM2_GTAG_MUXED_ENCODER))
-        return hm2_diag_add(setup->diag, HM2_ERR_MISMATCH,
-                            "the firmware has plain and muxed encoders, whose pins would have the same names; "
-                            "load with num_encoders=0");
     const unsigned good = muxed ? 3 : 2;
     if (md->version < good)
         hm2_diag_warn(setup->diag, "%s version %u is old firmware with a faulty %s; version %u or later is good",

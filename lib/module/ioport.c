@@ -237,7 +237,7 @@ static struct ioport *allocate(const struct hm2_setup *const setup)
 static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 {
     const struct hm2_idrom *const idrom = setup->idrom;
-    if (module->md->instances != idrom->io_ports)
+    if (module->md->instances < idrom->io_ports)
         return hm2_diag_add(setup->diag, HM2_ERR_MISMATCH,
                             "the IOPort module has %u instances, but the IDROM header says %u ports",
                             module->md->instances, (unsigned)idrom->io_ports);

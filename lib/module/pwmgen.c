@@ -12,6 +12,7 @@
 enum { REG_VALUE = 0, REG_MODE = 1, REG_PWM_RATE = 2, REG_PDM_RATE = 3, REG_ENABLE = 4 };
 
 #define VERSION_DITHER 1u
+#define MAX_GENERATORS 32u /* bits of the enable register */
 
 /* Mode register (register map 3.6). */
 #define MODE_OUTPUT_SHIFT    3
@@ -287,10 +288,11 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup_
 {
     if (module->instances == 0)
         return 0;
-    if (module->instances > 32)
-        return hm2_diag_add(setup_->diag, HM2_ERR_MISMATCH,
-                            "the firmware has %u PWM generators; its enable register holds at most 32",
-                            module->instances);
+    if (module->instances > MAX_GENERATORS) {
+        hm2_diag_warn(setup_->diag, "%s: the firmware has %u PWM generators; using %u, which its enable register holds",
+                      setup_->prefix, module->instances, MAX_GENERATORS);
+        module->instances = MAX_GENERATORS;
+    }
     struct pwmgen_module *const ctx =
         hm2_setup_alloc(setup_, sizeof *ctx + module->instances * sizeof ctx->generator[0]);
     if (!ctx)

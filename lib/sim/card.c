@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <hm2/lbp16.h>
+
 #include "lbp16_engine.h"
 #include "map.h"
 #include "profiles.h"
@@ -292,9 +294,16 @@ static void power_up(struct sim_card *const card)
 static int build(struct sim_card *const card, const struct sim_card_options *const options, struct hm2_diag *const diag)
 {
     const struct sim_profile *const profile = sim_profile_find(options->profile);
-    if (!profile)
+    if (!profile) {
+        char known[768];
+        sim_profile_list(known, sizeof known);
         return hm2_diag_add(diag, HM2_ERR_NOTFOUND, "no simulated card is called \"%s\"; there are: %s",
-                            options->profile ? options->profile : "", sim_profile_list());
+                            options->profile ? options->profile : "", known);
+    }
+    const size_t name_len = options->card_name ? strlen(options->card_name) : 1;
+    if (name_len < 1 || name_len > LBP16_INFO_NAME_BYTES)
+        return hm2_diag_add(diag, HM2_ERR_RANGE, "\"%s\" found, expected a card's name of 1 to %u characters",
+                            options->card_name, LBP16_INFO_NAME_BYTES);
     card->profile = profile;
     if (options->image)
         card->image = *options->image;

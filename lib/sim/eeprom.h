@@ -15,7 +15,8 @@ struct sim_eeprom {
 
 struct sim_profile;
 
-void sim_eeprom_factory(struct sim_eeprom *eeprom, const struct sim_profile *profile, const uint8_t mac[6],
-                        const uint8_t ip[4]);
+/* name = NULL: the profile's. */
+void sim_eeprom_factory(struct sim_eeprom *eeprom, const struct sim_profile *profile, const char *name,
+                        const uint8_t mac[6], const uint8_t ip[4]);
 
 #endif

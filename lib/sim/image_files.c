@@ -17,7 +17,7 @@
 #define EFINIX_FALLBACK  680000u
 #define XILINX_SLX9      340604u
 #define XILINX_SLX16     464196u
-#define IDCODE_SLX16     0x04002093u
+#define XILINX_SLX25     801462u
 #define COR1             0x3D00u
 #define COR1_CRC_BYPASS  0x0010u
 #define COR2             0x8DECu
@@ -140,7 +140,9 @@ static void put_xilinx(struct writer *const w, const struct sim_flash_file *cons
                        const struct sim_profile *const profile)
 {
     static const uint8_t head[] = {0x00, 0x09, 0x0F, 0xF0, 0x0F, 0xF0, 0x0F, 0xF0, 0x0F, 0xF0, 0x00, 0x00, 0x01};
-    const size_t real = profile->idcode == IDCODE_SLX16 ? XILINX_SLX16 : XILINX_SLX9;
+    const size_t real = profile->idcode == SIM_IDCODE_SLX25   ? XILINX_SLX25
+                        : profile->idcode == SIM_IDCODE_SLX16 ? XILINX_SLX16
+                                                              : XILINX_SLX9;
     const size_t least = XILINX_BEFORE + SIM_STAMP_BYTES + XILINX_BEHIND;
     const size_t bytes = file->bytes > least ? file->bytes & ~(size_t)1 : file->bytes > 0 ? least : real;
     put(w, head, sizeof head);

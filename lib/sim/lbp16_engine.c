@@ -521,7 +521,8 @@ static void set_identity(struct sim_lbp16 *const e, const struct sim_card_option
     const bool own_ip = all_zero(options->ip, 4);
     memcpy(e->ip, own_ip ? e->profile->ip : options->ip, sizeof e->ip);
     e->stamp_zero = sim_prng_next(&random) >> 16;
-    sim_eeprom_factory(&e->eeprom, e->profile, e->mac, own_ip ? e->profile->eeprom_ip : options->ip);
+    sim_eeprom_factory(&e->eeprom, e->profile, options->card_name, e->mac,
+                       own_ip ? e->profile->eeprom_ip : options->ip);
 }
 
 int sim_lbp16_new(struct sim_lbp16 **const engine, struct sim_card *const card,

@@ -18,7 +18,7 @@ struct sim_pin_row {
 };
 
 struct sim_firmware {
-    char board_name[9];
+    const char *board_name; /* 8 characters */
     uint32_t fpga_size, fpga_pins;
     uint32_t io_ports, port_width;
     uint32_t clock_low_hz, clock_high_hz;
@@ -30,9 +30,12 @@ struct sim_firmware {
     unsigned local_pin_count;
 };
 
+#define SIM_IDCODE_SLX16 0x04002093u
+#define SIM_IDCODE_SLX25 0x04004093u
+
 struct sim_profile {
     const char *name;
-    char card_name[17];                     /* EEPROM and space 7 */
+    const char *card_name;                  /* EEPROM and space 7 */
     bool efinix;                            /* undriven bus reads zeros, no boot block; else Xilinx */
     uint16_t lbp_version, firmware_version; /* space 7 (seed 000, "SPACE 7") */
     uint8_t ip[4];                          /* that the card uses as its jumpers say */
@@ -45,8 +48,11 @@ struct sim_profile {
 };
 
 const struct sim_profile *sim_profile_find(const char *name);
-/* All names in one string, for messages. */
-const char *sim_profile_list(void);
+/* All names, with blanks between them, for messages. */
+void sim_profile_list(char *text, size_t size);
+extern const struct sim_firmware sim_firmware_7i93_svst4_8, sim_firmware_7i93_svst8_8im2,
+    sim_firmware_7i93_svst1_4_7i47s, sim_firmware_7i93_2x7i65, sim_firmware_7i93_sv12im_2x7i48,
+    sim_firmware_7i93_sv6_7i49;
 void sim_profile_image(const struct sim_profile *profile, struct hm2_image *image);
 
 #endif

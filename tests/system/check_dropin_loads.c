@@ -280,7 +280,7 @@ static const struct {
     {"debug=1", "payload of a cycle: request "},
     {"debug_idrom=1", "payload of a cycle: request "},
     {"debug_module_descriptors=1", "payload of a cycle: request "},
-    {"debug_pin_descriptors=1", "IO Pin 017 (TB1-2/3): StepGen #0, pin Step"},
+    {"debug_pin_descriptors=1", "IO Pin 017 (TB1-2,3): StepGen #0, pin Step"},
     {"debug_modules=1", "payload of a cycle: request "},
     {"debug=0", NULL},
     {"board_rtnet=posix", NULL},

@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <check.h>
 #include <errno.h>
+#include <glob.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -27,6 +28,7 @@
 #define FLEET       8
 #define US_PER_S    1e6
 #define MAX_PAYLOAD 64
+#define MAX_IMAGES  32 /* cards in one process */
 
 static struct process sim, client;
 static char address[16];
@@ -257,6 +259,7 @@ START_TEST(what_the_card_does_not_have_is_refused)
         {"--servo", "0:0:0:SpinOut:100", "no remote with such a numeric output"},
         {"--ppmc", "/nonexistent/socket", "No such file"},
         {"--firmware", "/nonexistent.hex", "/nonexistent.hex"},
+        {"--name", "seventeen letters", "a card's name of 1 to 16 characters"},
         {"--bind", "192.0.2.1", "cannot listen"},
         {"--control", "/nonexistent/socket", "control socket"},
     };
@@ -307,6 +310,48 @@ START_TEST(another_firmware_can_be_loaded)
     start_sim((const char *const[]){"--card", "7i93", "--firmware", TEST_DATA "/idrom/SVST4_6NA_48.hex", NULL});
     ck_assert_uint_eq(read_register(0x0400), 3);
     ck_assert_uint_eq(read_register(0x0100), 0x55AACAFE);
+    stop_sim();
+}
+END_TEST
+
+/* So many cards in one process, each with the next image. */
+static void run_images(char *const *const paths, const size_t count)
+{
+    static const char ready[] = "ready 7i93@";
+    const char *argv[4 * MAX_IMAGES + 8] = {process_built("hm2sim"), "--bind", address, "--port", "0"};
+    const char *line;
+    unsigned n = 5, cards = 0;
+    for (size_t i = 0; i < count; i++) {
+        const char *const more[] = {"--card", "7i93", "--firmware", paths[i]};
+        memcpy(argv + n, more, sizeof more);
+        n += 4;
+    }
+    argv[n] = NULL;
+    process_start(&sim, argv);
+    if (!process_wait_line(&sim, ready, READY_MS, &line))
+        ck_abort_msg("hm2sim is not ready: %s", sim.text);
+    for (; *line && *line != '\n'; line++)
+        cards += *line == '@';
+    ck_assert_uint_eq(cards, count);
+    stop_sim();
+}
+
+START_TEST(every_image_that_was_dumped_makes_a_card)
+{
+    glob_t images;
+    test_address(0, address);
+    ck_assert_int_eq(glob(TEST_DATA "/idrom/*.hex", 0, NULL, &images), 0);
+    ck_assert_uint_eq(images.gl_pathc, 218);
+    for (size_t i = 0; i < images.gl_pathc; i += MAX_IMAGES)
+        run_images(images.gl_pathv + i, images.gl_pathc - i < MAX_IMAGES ? images.gl_pathc - i : MAX_IMAGES);
+    globfree(&images);
+}
+END_TEST
+
+START_TEST(a_card_may_report_another_name)
+{
+    start_sim((const char *const[]){"--card", "7i93", "--name", "litehm2", NULL});
+    exchange("885D0000", "6C697465686D32000000000000000000");
     stop_sim();
 }
 END_TEST
@@ -635,6 +680,8 @@ int main(void)
     tcase_add_test(tests, it_ends_by_itself_after_the_time_given);
     tcase_add_test(tests, several_cards_live_in_one_process);
     tcase_add_test(tests, another_firmware_can_be_loaded);
+    tcase_add_test(tests, every_image_that_was_dumped_makes_a_card);
+    tcase_add_test(tests, a_card_may_report_another_name);
     tcase_add_test(tests, faults_come_and_go_by_command);
     tcase_add_test(tests, a_power_cycle_makes_the_card_forget_and_come_back);
     tcase_add_test(tests, a_stranger_sends_from_another_port);

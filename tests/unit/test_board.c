@@ -405,6 +405,25 @@ static void descriptors_that_do_not_suit_their_driver_are_all_reported(void **st
     assert_int_equal(hm2_plain_count(f->plain), 0);
 }
 
+static void what_cannot_be_driven_is_left_alone_unless_it_is_asked_for(void **state)
+{
+    struct fixture *const f = *state;
+    f->card.image.rom[(0x40 + 12 * 10 + 8) / 4] = 0x10; /* LED with a register per instance */
+    assert_int_equal(setup_with(f, NULL), 0);
+    said(f, "warning: hm2_7i96s.0: module LED (tag 0x80): ");
+    said(f, "; the firmware does not suit this driver; it is left alone");
+    for (unsigned i = 0; i < f->board->module_count; i++)
+        assert_string_not_equal(f->board->modules[i].type->name, "led");
+}
+
+static void what_is_asked_for_must_be_there(void **state)
+{
+    struct fixture *const f = *state;
+    f->card.image.rom[(0x40 + 12 * 4) / 4] = 0x0101020C; /* muxed encoder instead of PWM */
+    assert_int_equal(setup_with(f, "num_encoders=1"), HM2_ERR_MISMATCH);
+    said(f, "the firmware has both Encoder and Muxed Encoder, which share the name encoder; only Encoder is used");
+}
+
 static void pins_are_listed_with_terminal_and_owner(void **state)
 {
     struct fixture *const f = *state;
@@ -412,8 +431,8 @@ static void pins_are_listed_with_terminal_and_owner(void **state)
     char text[8192];
     const size_t needed = hm2_board_describe_pins(f->board, text, sizeof text);
     assert_int_equal(needed, strlen(text));
-    assert_non_null(strstr(text, "IO Pin 017 (TB1-2/3): StepGen #0, pin Step (Output)\n"));
-    assert_non_null(strstr(text, "IO Pin 050 (P1-13): IOPort\n"));
+    assert_non_null(strstr(text, "IO Pin 017 (TB1-2,3): StepGen #0, pin Step (Output)\n"));
+    assert_non_null(strstr(text, "IO Pin 050 (P1-25/DB25-13): IOPort\n"));
     char little[64];
     assert_int_equal(hm2_board_describe_pins(f->board, little, sizeof little), needed);
     assert_memory_equal(little, text, sizeof little - 1);
@@ -1266,6 +1285,8 @@ int main(void)
         TEST(a_smart_serial_port_that_the_firmware_lacks_has_no_effect),
         TEST(a_bad_config_word_is_refused),
         TEST(descriptors_that_do_not_suit_their_driver_are_all_reported),
+        TEST(what_cannot_be_driven_is_left_alone_unless_it_is_asked_for),
+        TEST(what_is_asked_for_must_be_there),
         TEST(pins_are_listed_with_terminal_and_owner),
         TEST(start_confirms_every_register_before_the_first_read),
         TEST(start_gives_up_on_a_card_that_fell_silent),

@@ -229,27 +229,6 @@ static void probing_for_the_timer_spares_the_counts_of_another_module(void **sta
     rig_free(rig);
 }
 
-static void plain_and_muxed_encoders_together_are_refused_with_a_way_out(void **state)
-{
-    (void)state;
-    static const struct rig_md modules[] = {
-        {HM2_GTAG_IOPORT, 0, 1, 3, 0x1000, 5, 0x00, 0x1F},
-        {HM2_GTAG_ENCODER, 2, 1, 1, 0x3000, 5, 0x00, 3},
-        {HM2_GTAG_MUXED_ENCODER, 3, 1, 2, 0x3600, 5, 0x00, 3},
-    };
-    struct module_rig *rig = rig_new(rig_image_with(modules, 3, NULL, 0), "");
-    assert_int_equal(rig_try_add(rig, &hm2_encoder_type), HM2_ERR_MISMATCH);
-    assert_non_null(strstr(rig->diag.text, "num_encoders=0"));
-    rig_free(rig);
-    rig = rig_new(rig_image_with(modules, 3, NULL, 0), "num_encoders=0");
-    assert_int_equal(rig_try_add(rig, &hm2_encoder_type), 0);
-    assert_int_equal(rig_try_add(rig, &hm2_muxed_encoder_type), 0);
-    rig_start(rig);
-    rig_cycles(rig, 2);
-    assert_int_equal(hm2_plain_count(rig->plain), 0);
-    rig_free(rig);
-}
-
 /* ---- counts ------------------------------------------------------------------------------------------------------ */
 
 /* A host may link a pin at any time, to a signal that has another value. */
@@ -760,7 +739,6 @@ int main(void)
         cmocka_unit_test(the_timer_is_used_when_the_card_has_its_register),
         cmocka_unit_test(a_timer_number_without_a_register_does_nothing),
         cmocka_unit_test(probing_for_the_timer_spares_the_counts_of_another_module),
-        cmocka_unit_test(plain_and_muxed_encoders_together_are_refused_with_a_way_out),
         cmocka_unit_test(pins_of_an_encoder_that_stands_still_are_written_at_once_at_first_and_then_in_turns),
         cmocka_unit_test(pins_act_on_an_encoder_that_stands_still),
         cmocka_unit_test(counting_starts_at_the_counters_value),

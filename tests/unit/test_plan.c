@@ -366,8 +366,8 @@ static void a_full_plan_says_what_it_holds(void **state)
     for (err = 0, added = 0; !err; added++)
         err = hm2_plan_add_setup(fixture->plan, &sections[added], HM2_RANK_NORMAL, 0x1000, 127, 0, &fixture->diag);
     assert_int_equal(err, HM2_ERR_NOSPACE);
-    assert_int_equal(added, 9); /* 8 * 512 = 4096 */
-    assert_non_null(strstr(fixture->diag.text, "it has 8 and 4096"));
+    assert_int_equal(added, 13); /* 12 * 512 = 6144 */
+    assert_non_null(strstr(fixture->diag.text, "it has 12 and 6144"));
 }
 
 /* ---- replies ----------------------------------------------------------------------------------------------------- */

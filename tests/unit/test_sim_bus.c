@@ -160,7 +160,7 @@ static void what_nobody_drives_is_told_and_rests_as_the_bus_does(void **state)
 static void an_unknown_card_is_refused_with_the_known_ones(void **state)
 {
     (void)state;
-    const struct sim_card_options options = {.profile = "7i97"};
+    const struct sim_card_options options = {.profile = "7i99"};
     struct sim_card *card = NULL;
     struct hm2_diag diag = {0};
     assert_int_equal(sim_card_new(&card, &options, &diag), HM2_ERR_NOTFOUND);

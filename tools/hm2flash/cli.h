@@ -117,9 +117,9 @@ int do_info(struct cli *cli, const char *arg);
 int do_discover(struct cli *cli, const char *arg);
 int do_report(struct cli *cli, const char *arg);
 
-struct terminals;
+struct hm2_terminals;
 /* Terminal names of a connector (NULL = none) and what they are called, as the options or the card's table say. */
-const struct terminals *terminals_of(const struct cli *cli, unsigned port, const char **name);
+const struct hm2_terminals *terminals_of(const struct cli *cli, unsigned port, const char **name);
 const char *connector_of(const struct cli *cli, unsigned port);
 
 /* What a smart-serial remote's unit number says of it: " ANALOG" or nothing. */

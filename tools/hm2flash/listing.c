@@ -26,13 +26,13 @@ static struct hm2_idrom *idrom_of(struct cli *const cli)
     return &idrom;
 }
 
-const struct terminals *terminals_of(const struct cli *const cli, const unsigned port, const char **const name)
+const struct hm2_terminals *terminals_of(const struct cli *const cli, const unsigned port, const char **const name)
 {
     const struct flash_board *const board = cli->info->board;
     *name = port < CONNECTORS ? cli->dbnames[port] : NULL;
     if (!*name && board && port < 4)
         *name = board->terminals[port];
-    return *name ? terminals_find(*name) : NULL;
+    return *name ? hm2_terminals_find(*name) : NULL;
 }
 
 const char *connector_of(const struct cli *const cli, const unsigned port)
@@ -85,8 +85,8 @@ static void print_modules(const struct hm2_idrom *const rom)
     }
 }
 
-static void print_pin(const struct hm2_idrom *const rom, const struct terminals *const terminals, const unsigned pin,
-                      const unsigned io)
+static void print_pin(const struct hm2_idrom *const rom, const struct hm2_terminals *const terminals,
+                      const unsigned pin, const unsigned io)
 {
     const struct hm2_pd *const pd = &rom->pins[io];
     char buf[48];
@@ -115,7 +115,7 @@ static void print_text(const struct cli *const cli, const struct hm2_idrom *cons
     printf("Configuration pin-out:\n");
     for (unsigned port = 0; port < rom->io_ports; port++) {
         const char *name;
-        const struct terminals *const terminals = terminals_of(cli, port, &name);
+        const struct hm2_terminals *const terminals = terminals_of(cli, port, &name);
         printf("\nIO Connections for %s%s%s\n", connector_of(cli, port), name ? " -> " : "", name ? name : "");
         printf("%s                  I/O   Pri. func    Sec. func        Chan     Sec. Pin func   Sec. Pin Dir\n\n",
                rom->port_width == DB25_WIDTH && !name ? "DB25 pin#" : "Pin#");
@@ -129,7 +129,7 @@ static void print_text(const struct cli *const cli, const struct hm2_idrom *cons
  * -------------------------------------------------------------------------------------------------------------- */
 
 static void print_xml_pin(const struct cli *const cli, const struct hm2_idrom *const rom,
-                          const struct terminals *const terminals, const unsigned port, const unsigned pin)
+                          const struct hm2_terminals *const terminals, const unsigned port, const unsigned pin)
 {
     const unsigned io = port * rom->port_width + pin;
     const struct hm2_pd *const pd = &rom->pins[io];
@@ -166,7 +166,7 @@ static void print_xml(const struct cli *const cli, const struct hm2_idrom *const
                tag_text(rom->modules[i].gtag, true, buf, sizeof buf), rom->modules[i].instances);
     printf("    </modules>\n    <pins>\n");
     for (unsigned port = 0; port < rom->io_ports; port++) {
-        const struct terminals *const terminals = terminals_of(cli, port, &name);
+        const struct hm2_terminals *const terminals = terminals_of(cli, port, &name);
         for (unsigned pin = 0; pin < rom->port_width && port * rom->port_width + pin < rom->pin_count; pin++)
             print_xml_pin(cli, rom, terminals, port, pin);
     }
@@ -181,7 +181,7 @@ static void print_json_pin(const struct cli *const cli, const struct hm2_idrom *
     const struct hm2_pd *const pd = &rom->pins[io];
     const unsigned port = io / rom->port_width, pin = io % rom->port_width;
     const char *name;
-    const struct terminals *const terminals = terminals_of(cli, port, &name);
+    const struct hm2_terminals *const terminals = terminals_of(cli, port, &name);
     char buf[48];
     json_object(cli);
     json_number(cli, "io", io);

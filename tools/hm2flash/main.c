@@ -391,13 +391,13 @@ static void upper(char *const to, const size_t size, const char *const from)
 
 static int take_dbname(struct cli *const cli, const unsigned connector, const char *const name)
 {
-    const struct terminals *table = terminals_find(name);
+    const struct hm2_terminals *table = hm2_terminals_find(name);
     if (table) {
         cli->dbnames[connector] = table->name; /* in capitals, however it was given */
         return DONE;
     }
     printf("--dbname%u %s not recognized\nValid daughterboard names are:\n", connector + 1, name);
-    for (size_t i = 0; (table = terminals_at(i)) != NULL; i++)
+    for (size_t i = 0; (table = hm2_terminals_at(i)) != NULL; i++)
         printf("%10s,%s", table->name, i % 6 == 5 ? "\n" : "");
     printf("\n");
     return USAGE;

@@ -8,17 +8,10 @@
 #include <stdint.h>
 
 #include <hm2/idrom.h>
+#include <hm2/terminals.h>
 
 const char *tag_text(uint8_t tag, bool xml, char *buf, size_t size);
 /* Secondary function of a pin, without its direction. */
 const char *pin_text(const struct hm2_pd *pd, bool xml, char *buf, size_t size);
-
-struct terminals {
-    const char *name;
-    size_t count;
-    const char *const *terminals; /* by pin of the connector */
-};
-const struct terminals *terminals_find(const char *name); /* in any case, or NULL */
-const struct terminals *terminals_at(size_t index);       /* NULL behind the last */
 
 #endif

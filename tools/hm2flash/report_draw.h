@@ -12,8 +12,8 @@
 struct connector {
     const struct hm2_idrom *rom;
     unsigned port;
-    const char *name, *daughter;       /* daughter: name of the board behind it, or NULL */
-    const struct terminals *terminals; /* or NULL */
+    const char *name, *daughter;           /* daughter: name of the board behind it, or NULL */
+    const struct hm2_terminals *terminals; /* or NULL */
 };
 
 void draw_connector(FILE *out, const struct connector *connector);

@@ -481,6 +481,7 @@ enum {
     OPT_PORT,
     OPT_SEED,
     OPT_FIRMWARE,
+    OPT_NAME,
     OPT_FAULTS,
     OPT_WIRE,
     OPT_FOLLOW,
@@ -516,6 +517,7 @@ static const struct option long_options[] = {
     {"port", required_argument, NULL, OPT_PORT},
     {"seed", required_argument, NULL, OPT_SEED},
     {"firmware", required_argument, NULL, OPT_FIRMWARE},
+    {"name", required_argument, NULL, OPT_NAME},
     {"faults", required_argument, NULL, OPT_FAULTS},
     {"wire", required_argument, NULL, OPT_WIRE},
     {"follow", required_argument, NULL, OPT_FOLLOW},
@@ -546,18 +548,29 @@ static const struct option long_options[] = {
     {NULL, 0, NULL, 0},
 };
 
+/* In lines of a terminal's width. */
+static void print_names(const char *const heading, const char *const *names)
+{
+    const size_t width = 100;
+    size_t column = width;
+    fputs(heading, stdout);
+    for (; *names; names++) {
+        const size_t len = strlen(*names) + 1;
+        column = column + len > width ? 1 : column;
+        printf("%s %s", column == 1 ? "\n " : "", *names);
+        column += len;
+    }
+}
+
 static void print_help(void)
 {
     fputs("hm2sim: Mesa HostMot2 Ethernet cards, simulated, on UDP\n"
           "\n"
           "usage: hm2sim [OPTION...]\n"
           "\n"
-          "  --card TYPE[@ADDRESS[:PORT]]  one more card (default: one 7i96s). Types:",
+          "  --card TYPE[@ADDRESS[:PORT]]  one more card (default: one 7i96s). Types are at the end\n",
           stdout);
-    for (const char *const *type = sim_profiles(); *type; type++)
-        printf(" %s", *type);
-    fputs("\n"
-          "  --bind ADDRESS      of cards that give none (127.0.0.1)\n"
+    fputs("  --bind ADDRESS      of cards that give none (127.0.0.1)\n"
           "  --port PORT         of cards that give none (27181; 0 = any free one)\n"
           "  --seed N            of faults and MAC addresses (1)\n"
           "  --faults LIST       loss=, dup=, reorder=, truncate=, foreign= 0..1, delay=US[-US]; by commas\n"
@@ -572,6 +585,7 @@ static void print_help(void)
           "\n"
           "of the card named last, or of every card when before the first --card:\n"
           "  --firmware FILE     image as text, lines of ADDRESS VALUE in hexadecimal\n"
+          "  --name NAME         card name that it reports, in place of its type's\n"
           "  --mac XX:XX:XX:XX:XX:XX\n"
           "  --flash FILE        keep the configuration flash in a file\n"
           "  --flash-chip SIZE   2Mb, 4Mb, 8Mb, 16Mb (the usual one), 32Mb\n"
@@ -595,11 +609,10 @@ static void print_help(void)
         "\n"
         "  --servo ENC:PORT:CHANNEL:OUTPUT:COUNTS[:MS]  a motor at a remote's analog output, COUNTS a second at full\n"
         "                      output, with a time constant\n"
-        "\n"
-        "Remotes for --serial:",
+        "\n",
         stdout);
-    for (const char *const *remote = remote_names(); *remote; remote++)
-        printf(" %s", *remote);
+    print_names("Remotes for --serial:", remote_names());
+    print_names("\n\nTypes of cards:", sim_profiles());
     fputs("\n\n"
           "When all cards listen, one line \"ready CARD@ADDRESS:PORT ...\" is printed. SIGINT and SIGTERM end it.\n",
           stdout);
@@ -663,6 +676,9 @@ static int take_card_option(struct reading *const r, const int option, const cha
     switch (option) {
     case OPT_FIRMWARE:
         r->card->firmware = value;
+        return 0;
+    case OPT_NAME:
+        r->card->name = value;
         return 0;
     case OPT_MAC:
         return set_mac(r, value);

@@ -84,6 +84,7 @@ struct card_options {
     struct in_addr address;
     uint16_t port;
     const char *firmware; /* file */
+    const char *name;     /* that the card reports, or NULL */
     uint8_t mac[6];
     struct flash_options flash;
     unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count, remote_count,

@@ -25,15 +25,17 @@
 #include <hm2/plan.h>
 #include <hm2/points.h>
 
+#define HM2_BOARD_CONNECTORS 4u
+
 /* What a card's name tells (hal-interface 1.3). */
 struct hm2_board_type {
     const char *name;              /* compared with the 16 characters of LBP16 space 7 */
     unsigned compared;             /* characters compared, terminating zeros included */
     const char *stem;              /* HAL name: "7i96s" */
-    unsigned io_ports, port_width; /* 0 = unknown card: from the IDROM */
-    const char *connectors[4];
+    unsigned io_ports, port_width; /* 0 = any: from the IDROM */
+    const char *connectors[HM2_BOARD_CONNECTORS];
     unsigned leds;
-    const char *const *terminals; /* one name per I/O, or NULL: connector and pin number are printed */
+    const char *terminals[HM2_BOARD_CONNECTORS]; /* hm2_terminals_find(); NULL: connector and pin number are printed */
 };
 
 #define HM2_BOARD_NAME_BYTES 16u

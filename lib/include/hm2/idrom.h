@@ -133,6 +133,9 @@ HM2_API uint64_t hm2_image_fingerprint(const struct hm2_image *image);
 /* First module with this tag, NULL when there is none. */
 HM2_API const struct hm2_md *hm2_idrom_find(const struct hm2_idrom *idrom, uint8_t gtag);
 
+/* Ports that can be used: the header's, or the IOPort module's where it has fewer (a warning of the parse). */
+HM2_API unsigned hm2_idrom_ports(const struct hm2_idrom *idrom);
+
 /* Byte address of register reg of an instance (1.4). No check of the arguments against the descriptor. */
 static inline uint16_t hm2_md_address(const struct hm2_md *const md, const unsigned reg, const unsigned instance)
 {

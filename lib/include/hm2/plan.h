@@ -42,7 +42,7 @@
 
 #define HM2_PLAN_MAX_WINDOWS  128u /* in each direction */
 #define HM2_PLAN_MAX_SECTIONS 160u
-#define HM2_PLAN_SETUP_BYTES  4096u
+#define HM2_PLAN_SETUP_BYTES  6144u
 
 /* Order inside a packet; the FPGA processes a packet from front to back. Equal ranks: by address (windows) or in the
  * order of registration (sections). Only windows of one rank and with adjacent addresses share a command. */

@@ -32,6 +32,7 @@ enum sim_sources { SIM_SOURCES_OF_MAP, SIM_SOURCES_2021, SIM_SOURCES_LATER };
 
 struct sim_card_options {
     const char *profile;           /* "7i96s", "7i93", ...: card name, EEPROM, bus and default firmware */
+    const char *card_name;         /* that the card reports in place of the profile's, 1 to 16 characters; or NULL */
     const struct hm2_image *image; /* other firmware instead of the profile's, or NULL; faulty ones are carried too */
     uint64_t seed;                 /* MAC address and start of the time stamps */
     uint8_t ip[4];                 /* address of the card, also in the EEPROM; zeros = those of the profile */

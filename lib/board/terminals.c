@@ -1,11 +1,9 @@
-/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Terminal names of daughter boards and of cards with terminals of their own (flash tool reference 2.6; as mesaflash
  * 3.5.16 has them, oddities included: programs compare them). */
-#include "names.h"
+#include <hm2/terminals.h>
 
 #include <strings.h>
-
-#include <stddef.h>
 
 static const char *const t_7i76[] = {
     "TB2-4,5",   "TB2-2,3",   "TB2-10,11", "TB2-8,9",           "TB2-16,17",         "TB2-14,15", "TB2-22,23",
@@ -229,7 +227,7 @@ static const char *const t_benezan[] = {"Spindle/PWM/Relay1",
 static const char *const t_hdr26[] = {"1",  "2",  "3",  "4",  "5",  "6",  "7",  "8", "9",
                                       "11", "13", "15", "17", "19", "21", "23", "25"};
 
-static const struct terminals tables[] = {
+static const struct hm2_terminals tables[] = {
     {"7I76", sizeof t_7i76 / sizeof t_7i76[0], t_7i76},
     {"7I77", sizeof t_7i77 / sizeof t_7i77[0], t_7i77},
     {"7I94_0", sizeof t_7i94_0 / sizeof t_7i94_0[0], t_7i94_0},
@@ -274,7 +272,7 @@ static const struct terminals tables[] = {
     {"HDR26", sizeof t_hdr26 / sizeof t_hdr26[0], t_hdr26},
 };
 
-const struct terminals *terminals_find(const char *const name)
+const struct hm2_terminals *hm2_terminals_find(const char *const name)
 {
     for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++)
         if (strcasecmp(name, tables[i].name) == 0)
@@ -282,7 +280,7 @@ const struct terminals *terminals_find(const char *const name)
     return NULL;
 }
 
-const struct terminals *terminals_at(const size_t index)
+const struct hm2_terminals *hm2_terminals_at(const size_t index)
 {
     return index < sizeof tables / sizeof tables[0] ? &tables[index] : NULL;
 }
