@@ -44,7 +44,7 @@ endif
 
 # ---- sources: a new file in its folder is part of the build -----------------------------------------------------
 
-LIB_DIRS := core link lbp16 hostmot2 module sslbp board motion ppmc flash lbp
+LIB_DIRS := core link lbp16 hostmot2 module sslbp board motion ppmc flash lbp can
 LIB_SRC := $(sort $(foreach d,$(LIB_DIRS),$(wildcard lib/$(d)/*.c)))
 SIM_SRC := $(sort $(wildcard lib/sim/*.c))
 HOST_SRC := $(sort $(wildcard lib/halhost/*.c))
@@ -68,6 +68,10 @@ EDIT_LIBS ?= $(shell $(PKG_CONFIG) --libs libedit 2>/dev/null)
 # Rules that keep other programs off the cards' interfaces; without it the component says that there are none.
 NFT_LIBS ?= $(shell $(PKG_CONFIG) --libs libnftables 2>/dev/null)
 LIBS_hm2_lbp16 := $(NFT_LIBS)
+
+# State and restart of CAN controllers; without it the component carries frames all the same.
+SOCKETCAN_LIBS ?= $(if $(wildcard /usr/include/libsocketcan.h),-lsocketcan)
+LIBS_can_io := $(SOCKETCAN_LIBS)
 
 obj = $(patsubst %.c,$(BUILDDIR)/obj/%.o,$(1))
 LIB_OBJ := $(call obj,$(LIB_SRC))
@@ -106,6 +110,7 @@ $(BUILDDIR)/obj/lib/sim/%: EXTRA_CPPFLAGS := -Ilib/sim
 $(BUILDDIR)/obj/lib/halhost/%: EXTRA_CPPFLAGS := -Ilib/halhost -Ilib/halhost/include
 $(BUILDDIR)/obj/components/%: EXTRA_CPPFLAGS := -Icomponents -Ilib/halhost/include -DRTAPI -D__MODULE__
 $(BUILDDIR)/obj/components/hm2_lbp16/% $(BUILDDIR)/obj/linuxcnc/components/hm2_lbp16/%: override CPPFLAGS += $(if $(NFT_LIBS),-DHM2_HAVE_NFTABLES)
+$(BUILDDIR)/obj/components/can_io/% $(BUILDDIR)/obj/linuxcnc/components/can_io/%: override CPPFLAGS += $(if $(SOCKETCAN_LIBS),-DHM2_HAVE_SOCKETCAN)
 $(BUILDDIR)/obj/tests/components/%: EXTRA_CPPFLAGS := -Icomponents -Ilib/halhost/include -DRTAPI -D__MODULE__
 # What a component exports is said by its EXPORT_SYMBOL()s and done by the linker (see component_link).
 $(BUILDDIR)/obj/components/% $(BUILDDIR)/obj/tests/components/%: VISIBILITY := default
@@ -117,7 +122,7 @@ $(BUILDDIR)/obj/tests/%: EXTRA_CPPFLAGS := -Ilib/sim -Ilib/halhost -Ilib/halhost
 
 # With another compiler or other flags everything is made anew: a folder never holds a mixture.
 FLAGS := $(BUILDDIR)/flags
-flags_text = $(subst ','\'',$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(LDFLAGS) $(EDIT_CFLAGS) $(EDIT_LIBS) $(NFT_LIBS))
+flags_text = $(subst ','\'',$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(LDFLAGS) $(EDIT_CFLAGS) $(EDIT_LIBS) $(NFT_LIBS) $(SOCKETCAN_LIBS))
 $(FLAGS): FORCE
 	@mkdir -p $(@D); echo '$(flags_text)' | cmp -s - $@ || echo '$(flags_text)' > $@
 .PHONY: FORCE

@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* From the bus to the pins. */
+#include "can_private.h"
+
+#include <string.h>
+
+#include <hm2/number.h>
+
+#define COUNT(array) (sizeof(array) / sizeof((array)[0]))
+#define S_PER_NS     1e-9
+
+static struct can_rx *find_rx(const struct hm2_can *const can, const uint32_t key)
+{
+    unsigned low = 0, high = can->rx_count;
+    while (low < high) {
+        const unsigned middle = low + (high - low) / 2u;
+        const struct hm2_dbc_message *const m = can->rx[middle].base.message;
+        const uint32_t found = can_key(m->id, m->extended);
+        if (found == key)
+            return &can->rx[middle];
+        if (found < key)
+            low = middle + 1u;
+        else
+            high = middle;
+    }
+    return NULL;
+}
+
+static void apply(struct hm2_can *const can, struct can_rx *const rx)
+{
+    for (unsigned i = 0; i < rx->base.pin_count; i++) {
+        const struct can_pin *const pin = &rx->base.pins[i];
+        if (rx->base.multiplexed && !hm2_dbc_present(can->dbc, pin->signal, rx->data))
+            continue;
+        const double value = hm2_dbc_value(pin->signal, rx->data);
+        if (value - value == 0.0) /* neither NaN nor infinite */
+            hm2_point_store(pin->point.type, *pin->value, value);
+        else
+            ++*can->points->malformed;
+    }
+    rx->fresh = false;
+}
+
+static void take_data(struct hm2_can *const can, struct can_rx *const rx, const struct hm2_can_frame *const frame,
+                      const int64_t now_ns)
+{
+    if (frame->bytes < rx->base.message->bytes) {
+        ++*can->points->malformed;
+        return;
+    }
+    memcpy(rx->data, frame->data, frame->bytes);
+    if (rx->received && frame->stamp_ns && rx->stamp_ns)
+        *rx->points->interval = (double)(frame->stamp_ns - rx->stamp_ns) * S_PER_NS;
+    rx->stamp_ns = frame->stamp_ns;
+    rx->at_ns = now_ns;
+    rx->received = true;
+    rx->fresh = true;
+    ++*rx->points->count;
+    *can->points->hardware_stamps = frame->hardware_stamp;
+    if (rx->base.multiplexed) /* the next frame may bring other signals */
+        apply(can, rx);
+}
+
+static void take_frame(struct hm2_can *const can, const struct hm2_can_frame *const frame, const int64_t now_ns)
+{
+    if (frame->error) {
+        can_error_frame(can, frame);
+        return;
+    }
+    ++*can->points->received;
+    struct can_rx *const rx = find_rx(can, can_key(frame->id, frame->extended));
+    if (rx && !frame->remote)
+        take_data(can, rx, frame, now_ns);
+}
+
+static void take_frames(struct hm2_can *const can, const int64_t now_ns)
+{
+    for (unsigned taken = 0; taken < HM2_CAN_FRAMES_PER_CYCLE;) {
+        const int count = can->bus->ops->receive(can->bus, can->frames, COUNT(can->frames));
+        if (count != 0)
+            *can->points->down = count < 0;
+        for (int i = 0; i < count; i++)
+            take_frame(can, &can->frames[i], now_ns);
+        if (count < (int)COUNT(can->frames))
+            return;
+        taken += (unsigned)count;
+    }
+    ++*can->points->full_cycles;
+}
+
+static void show_age(const struct hm2_can *const can, const struct can_rx *const rx, const int64_t now_ns)
+{
+    const int64_t age_ns = now_ns - (rx->received ? rx->at_ns : can->started_ns);
+    const int64_t timeout_ns = *rx->points->timeout_ms * NS_PER_MS;
+    *rx->points->age = (double)age_ns * S_PER_NS;
+    *rx->points->timed_out = !rx->received || (timeout_ns != 0 && age_ns > timeout_ns);
+}
+
+void hm2_can_read(struct hm2_can *const can, const int64_t now_ns)
+{
+    if (!can->started)
+        can->started_ns = now_ns;
+    can->started = true;
+    take_frames(can, now_ns);
+    for (unsigned i = 0; i < can->rx_count; i++) {
+        if (can->rx[i].fresh)
+            apply(can, &can->rx[i]);
+        show_age(can, &can->rx[i], now_ns);
+    }
+    *can->points->overruns = can->bus->overruns;
+}
+
+/* ---- error frames (linux/can/error.h)
+ * -------------------------------------------------------------------------------- */
+
+#define ERROR_CONTROLLER 0x004u /* data[1] has the controller's state */
+#define ERROR_BUS_OFF    0x040u
+#define ERROR_RESTARTED  0x100u
+#define ERROR_COUNTERS   0x200u /* data[6] and data[7] are the counters */
+#define STATE_WARNING    0x0Cu  /* of receiving or sending */
+#define STATE_PASSIVE    0x30u
+#define STATE_ACTIVE     0x40u
+
+void can_error_frame(struct hm2_can *const can, const struct hm2_can_frame *const frame)
+{
+    const struct can_bus_points *const p = can->points;
+    ++*p->error_frames;
+    if (frame->id & ERROR_CONTROLLER && frame->data[1] & (STATE_WARNING | STATE_PASSIVE | STATE_ACTIVE)) {
+        *p->error_passive = (frame->data[1] & STATE_PASSIVE) != 0;
+        *p->error_warning = (frame->data[1] & (STATE_WARNING | STATE_PASSIVE)) != 0;
+    }
+    if (frame->id & ERROR_COUNTERS) {
+        *p->tx_error_counter = frame->data[6];
+        *p->rx_error_counter = frame->data[7];
+    }
+    if (frame->id & ERROR_BUS_OFF)
+        *p->bus_off = true;
+    if (frame->id & ERROR_RESTARTED)
+        *p->bus_off = *p->error_passive = *p->error_warning = false;
+}
