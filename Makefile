@@ -44,7 +44,7 @@ endif
 
 # ---- sources: a new file in its folder is part of the build -----------------------------------------------------
 
-LIB_DIRS := core link lbp16 hostmot2 module sslbp board motion ppmc flash lbp can
+LIB_DIRS := core link lbp16 hostmot2 module sslbp board motion ppmc flash lbp can modbus
 LIB_SRC := $(sort $(foreach d,$(LIB_DIRS),$(wildcard lib/$(d)/*.c)))
 SIM_SRC := $(sort $(wildcard lib/sim/*.c))
 HOST_SRC := $(sort $(wildcard lib/halhost/*.c))
