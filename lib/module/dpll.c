@@ -72,7 +72,7 @@ static int add_registers(struct dpll *const ctx, const struct hm2_md *const md, 
         {&ctx->timers12, REG_TIMERS12, 0},   {&ctx->timers34, REG_TIMERS34, 0},
     };
     int err =
-        hm2_plan_add_read(setup->plan, &ctx->sync, HM2_RANK_FIRST, hm2_md_address(md, REG_SYNC, 0), 1, setup->diag);
+        hm2_plan_add_read(setup->plan, &ctx->sync, HM2_RANK_ARRIVAL, hm2_md_address(md, REG_SYNC, 0), 1, setup->diag);
     if (err == 0)
         err = hm2_plan_add_read(setup->plan, &ctx->control1_read, HM2_RANK_NORMAL, hm2_md_address(md, REG_CONTROL1, 0),
                                 1, setup->diag);
