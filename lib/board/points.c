@@ -45,9 +45,24 @@ static const struct hm2_point flight_points[] = {
 };
 #define FLIGHT_POINTS (sizeof flight_points / sizeof flight_points[0])
 
+#define L(field, name, type, dir, init, unit, help) \
+    HM2_POINT(struct board_pipeline_points, field, name, type, dir, init, unit, help)
+
+static const struct hm2_point pipeline_points[] = {
+    L(active, "pipeline.active", HM2_BIT, HM2_PIN_OUT, 0, "", "1 = inputs are read ahead; 0 = plain cycles"),
+    L(margin_us, "pipeline.margin-us", HM2_FLOAT, HM2_PIN_OUT, 0, "us",
+      "time that nearly every reply is there before it is read; negative = the read waited so long"),
+    L(data_age_us, "pipeline.data-age-us", HM2_FLOAT, HM2_PIN_OUT, 0, "us", "age of the inputs when they are read"),
+    L(wait_us, "pipeline.wait-us", HM2_U32, HM2_PIN_OUT, 0, "us", "time that the card has waited for its timer"),
+    L(late, "pipeline.late", HM2_U32, HM2_PIN_OUT, 0, "cycles", "replies that the read had to wait for"),
+    L(falls, "pipeline.falls", HM2_U32, HM2_PIN_OUT, 0, "", "returns to plain cycles because replies were late"),
+};
+#define PIPELINE_POINTS (sizeof pipeline_points / sizeof pipeline_points[0])
+
 static const struct hm2_point_group groups[] = {
     {"", points, sizeof points / sizeof points[0], NULL},
     {"", flight_points, FLIGHT_POINTS, "with flight_folder="},
+    {"", pipeline_points, PIPELINE_POINTS, "with pipelined= in config"},
     {NULL, NULL, 0, NULL},
 };
 
@@ -66,12 +81,25 @@ static int bind_flight(struct hm2_board *const board, struct hm2_binder *const b
     return hm2_bind_points(binder, flight_points, FLIGHT_POINTS, bound, board->prefix, 0, diag);
 }
 
+static int bind_pipeline(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
+{
+    struct board_pipeline_points *const bound = binder->alloc(binder, sizeof *bound);
+    if (!bound)
+        return hm2_diag_add(diag, HM2_ERR_NOMEM, "%s: the host gave no memory for the pipelined cycle's points",
+                            board->prefix);
+    board->pipeline.points = bound;
+    return hm2_bind_points(binder, pipeline_points, PIPELINE_POINTS, bound, board->prefix, 0, diag);
+}
+
 int board_points_bind(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
 {
     board->points = binder->alloc(binder, sizeof *board->points);
     if (!board->points)
         return hm2_diag_add(diag, HM2_ERR_NOMEM, "%s: the host gave no memory for the board's points", board->prefix);
-    const int err =
-        hm2_bind_points(binder, points, sizeof points / sizeof points[0], board->points, board->prefix, 0, diag);
-    return err == 0 && board->flight ? bind_flight(board, binder, diag) : err;
+    int err = hm2_bind_points(binder, points, sizeof points / sizeof points[0], board->points, board->prefix, 0, diag);
+    if (err == 0 && board->flight)
+        err = bind_flight(board, binder, diag);
+    if (err == 0 && board->config.pipelined > 0)
+        err = bind_pipeline(board, binder, diag);
+    return err;
 }

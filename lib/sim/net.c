@@ -64,7 +64,9 @@ static bool happens(struct sim_net *const net, const double probability)
 static int64_t draw_delay(struct sim_net *const net)
 {
     const uint64_t span = (uint64_t)(net->faults.delay_max_ns - net->faults.delay_min_ns) + 1;
-    return net->faults.delay_min_ns + (int64_t)sim_prng_below(&net->random, span);
+    const int64_t delay_ns = net->faults.delay_min_ns + (int64_t)sim_prng_below(&net->random, span);
+    /* Without a tail nothing is drawn for it: seeds keep what they give. */
+    return net->faults.tail > 0.0 && happens(net, net->faults.tail) ? delay_ns + net->faults.tail_ns : delay_ns;
 }
 
 static struct datagram *enqueue(struct sim_net *const net, const enum direction direction, const int64_t due_ns,
@@ -313,7 +315,9 @@ static bool probability(const double p)
 int sim_faults_check(const struct sim_faults *const f)
 {
     if (!probability(f->loss) || !probability(f->duplicate) || !probability(f->reorder) || !probability(f->truncate) ||
-        !probability(f->foreign))
+        !probability(f->foreign) || !probability(f->tail))
+        return HM2_ERR_RANGE;
+    if (f->tail_ns < 0 || f->tail_ns > MAX_DELAY_NS)
         return HM2_ERR_RANGE;
     if (f->delay_min_ns < 0 || f->delay_max_ns > MAX_DELAY_NS || f->delay_min_ns > f->delay_max_ns)
         return HM2_ERR_RANGE;

@@ -27,6 +27,7 @@ static void nothing_given_takes_everything_the_firmware_has(void **state)
         assert_int_equal(hm2_config_sserial_ports(&config, 3), 3);
         assert_int_equal(config.sserial_baudrate, -1);
         assert_false(config.use_serial_numbers);
+        assert_int_equal(config.pipelined, 0);
         assert_string_equal(config.ssi_format[31], "");
     }
 }
@@ -60,7 +61,8 @@ static void a_whole_line_of_a_machine_is_read(void **state)
     (void)state;
     const struct hm2_config config = parse(" num_encoders=1\tnum_stepgens=5  stepgen_width=4 sserial_port_1=0x3\n"
                                            "enable_raw firmware=hm2/7i96/sv.bit ssi_chan_3=nul%1bmpos%24ge\v"
-                                           "fanuc_chan_31=AA64 biss_chan_0=e%32Ml%32L ");
+                                           "fanuc_chan_31=AA64 biss_chan_0=e%32Ml%32L pipelined=3");
+    assert_int_equal(config.pipelined, 3);
     assert_int_equal(config.count[HM2_CFG_ENCODERS], 1);
     assert_int_equal(config.count[HM2_CFG_STEPGENS], 5);
     assert_int_equal(config.stepgen_width, 4);
@@ -107,6 +109,8 @@ static void what_is_not_exactly_right_is_refused_with_the_token(void **state)
     } cases[] = {
         {"num_encoders=3x", "config: \"num_encoders=3x\": a whole number from -1 to 1000 is expected after \"=\", "
                             "\"3x\" found"},
+        {"pipelined=5", "\"pipelined=5\": a whole number from 0 to 4 is expected"},
+        {"pipelined", "\"=\" and a value are expected"},
         {"num_encoders=", "\"num_encoders=\": a whole number"},
         {"num_encoders", "\"num_encoders\": a whole number"},
         {"num_encoders=-2", "\"-2\" found"},

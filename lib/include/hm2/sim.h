@@ -176,9 +176,11 @@ struct sim_faults {
     uint64_t seed;
     double loss, duplicate, reorder, truncate, foreign; /* probability per datagram, each direction, 0..1 */
     int64_t delay_min_ns, delay_max_ns;                 /* uniform, on top of the card's own time; 0..1 s */
+    double tail;                                        /* probability that a datagram takes tail_ns longer; 0..1 */
+    int64_t tail_ns;                                    /* 0..1 s */
 };
 
-/* 0, or HM2_ERR_RANGE for a probability outside 0..1, or delays outside 0..1 s or with min > max. */
+/* 0, or HM2_ERR_RANGE for a probability outside 0..1, or times outside 0..1 s or with min > max. */
 HM2_API int HM2_MUST_CHECK sim_faults_check(const struct sim_faults *faults);
 
 struct sim_net;
