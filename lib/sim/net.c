@@ -10,7 +10,7 @@
 #define ON_THE_WAY   64u
 #define INBOX        64u
 #define MAX_DELAY_NS 1000000000
-#define LONG_WORK_NS 200000   /* a full packet takes 150 us: more than this was asked for */
+#define LONG_WORK_NS 200000   /* a full packet takes 150 us: more than this is the flash's doing */
 #define HOLD_NS      10000000 /* a datagram held back for the next to overtake goes on after this */
 
 enum direction { TO_CARD, TO_CLIENT };
@@ -195,10 +195,11 @@ static void to_card(struct sim_net *const net, const struct datagram *const d)
     tell_taken(net, d, false);
     const size_t len = sim_card_packet(net->card, net->now_ns, d->data, d->len, reply, sizeof reply, &reply_ns);
     tell_taken(net, d, true);
-    const bool at_once = net->instant && reply_ns - net->now_ns < LONG_WORK_NS;
+    const int64_t waited_ns = sim_card_asked_ns(net->card);
+    const bool at_once = net->instant && reply_ns - net->now_ns - waited_ns < LONG_WORK_NS;
     net->client = d->client;
     if (len > 0 && !d->foreign)
-        carry(net, TO_CLIENT, at_once ? net->now_ns : reply_ns, reply, len);
+        carry(net, TO_CLIENT, at_once ? net->now_ns + waited_ns : reply_ns, reply, len);
 }
 
 /* Index in waiting[] of the datagram that is due next, waiting_count when there is none. */
