@@ -9,9 +9,11 @@
 #include <hm2/board.h>
 #include <hm2/module.h>
 
+#include "adaptive.h"
 #include "flight.h"
 #include "notice.h"
 #include "pipeline.h"
+#include "rtt.h"
 
 #define BOARD_STEM_SIZE   8u
 #define BOARD_PREFIX_SIZE 32u
@@ -176,6 +178,8 @@ struct hm2_board {
     int64_t request_ns, period_ns;
     int64_t read_ns; /* when read began, or the plain request it waits for was sent */
     struct board_pipeline pipeline;
+    struct board_adaptive adaptive;
+    struct board_rtt rtt;                       /* of plain requests, while one of these two uses it */
     int64_t received_ns;                        /* of the good reply to the last request; 0 = none */
     int64_t read_limit_ns, limit_for_period_ns; /* how long a reply is waited for, and what that was computed from */
     int32_t limit_for_setting;

@@ -149,6 +149,20 @@ static void take_serial_numbers(struct scan *const scan, const unsigned unused, 
     scan->config->use_serial_numbers = true;
 }
 
+static void take_adaptive(struct scan *const scan, const unsigned unused, const char *const value)
+{
+    (void)unused;
+    (void)value;
+    scan->config->adaptive_timeout = true;
+}
+
+static void take_second_request(struct scan *const scan, const unsigned unused, const char *const value)
+{
+    (void)unused;
+    (void)value;
+    scan->config->adaptive_timeout = scan->config->second_request = true;
+}
+
 static void take_pipelined(struct scan *const scan, const unsigned unused, const char *const value)
 {
     (void)unused;
@@ -205,6 +219,8 @@ static const struct key keys[] = {
     {"sserial_baudrate", 0, true, take_baudrate},
     {"use_serial_numbers", 0, false, take_serial_numbers},
     {"pipelined", 0, true, take_pipelined},
+    {"adaptive_timeout", 0, false, take_adaptive},
+    {"second_request", 0, false, take_second_request},
     {"sserial_port_", HM2_CFG_SSERIAL_PORTS, true, take_sserial},
     {"ssi_chan_", HM2_CFG_CHANNELS, true, take_ssi},
     {"biss_chan_", HM2_CFG_CHANNELS, true, take_biss},

@@ -184,6 +184,26 @@ static inline bool receive(struct hm2_board *const board, const struct board_buf
     return false;
 }
 
+/* A reply that is later than usual is taken for lost, and asked for once more where that is wanted. */
+static bool receive_adaptively(struct hm2_board *const board, const int64_t end_ns, const int64_t clock_ns)
+{
+    const int64_t patience_ns = board_adaptive_patience_ns(board, end_ns - board->request_ns);
+    const int64_t first_ns = board->request_ns + patience_ns;
+    if (receive(board, board->reply, first_ns, clock_ns, judge))
+        return true;
+    if (first_ns >= end_ns || !board_adaptive_ask_again(board))
+        return false;
+    const int64_t second_ns = first_ns + patience_ns;
+    return receive(board, board->reply, second_ns < end_ns ? second_ns : end_ns, LINK_CLOCK_UNREAD, judge);
+}
+
+static inline bool receive_reply(struct hm2_board *const board, const int64_t clock_ns)
+{
+    const int64_t end_ns = deadline_ns(board);
+    return board->adaptive.on ? receive_adaptively(board, end_ns, clock_ns)
+                              : receive(board, board->reply, end_ns, clock_ns, judge);
+}
+
 /* The reply to a turn should have been here for long: then it is taken without asking the clock or waiting. */
 static bool receive_turn(struct hm2_board *const board, bool *const on_time)
 {
@@ -323,6 +343,29 @@ static void take_reply(struct hm2_board *const board, const bool on_time)
     board_pipeline_received(board, on_time);
 }
 
+static void note_plain_reply(struct hm2_board *const board)
+{
+    if (board->adaptive.on)
+        board_adaptive_received(board);
+    if (!board->adaptive.asked_again)
+        board_rtt_add(&board->rtt, board->received_ns - board->request_ns);
+}
+
+static void read_plain(struct hm2_board *const board, const int64_t clock_ns)
+{
+    if (!board->sent || !receive_reply(board, clock_ns)) {
+        if (board->adaptive.on)
+            board_adaptive_lost(board);
+        lose_reply(board);
+        return;
+    }
+    take_reply(board, true);
+    if (board->adaptive.on || board->pipeline.timer > 0)
+        note_plain_reply(board);
+    measure_round_trip(board);
+    use_reply(board);
+}
+
 static void finish_turn(struct hm2_board *const board)
 {
     bool on_time;
@@ -360,12 +403,8 @@ void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
         read_identity(board);
     } else if (board->pipeline.turned) {
         finish_turn(board);
-    } else if (!board->sent || !receive(board, board->reply, deadline_ns(board), clock_ns, judge)) {
-        lose_reply(board);
     } else {
-        take_reply(board, true);
-        measure_round_trip(board);
-        use_reply(board);
+        read_plain(board, clock_ns);
     }
     if (board->flight)
         record_read(board);

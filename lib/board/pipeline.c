@@ -66,7 +66,7 @@ static int64_t compute_room_ns(struct hm2_board *const board)
     const int64_t timer_ns = hm2_dpll_timer_ns(hm2_board_module(board, HM2_GTAG_DPLL), p->timer);
     /* Arrivals jitter around the loop's reference by half of the timer's offset before the card stops waiting. */
     p->timeout_ns = timer_ns + timer_ns / 2;
-    p->rtt_ns = board_rtt_bound_ns(&p->rtt, RTT_ABOVE);
+    p->rtt_ns = board_rtt_bound_ns(&board->rtt, RTT_ABOVE);
     const int64_t room_ns = board->period_ns - p->work_ns - p->timeout_ns - p->rtt_ns;
     *p->points->margin_us = (double)room_ns * 1e-3;
     const bool possible = timer_ns >= 1000 && p->timeout_ns <= board->period_ns / 2 && p->timeout_ns <= 65535000;
@@ -76,7 +76,7 @@ static int64_t compute_room_ns(struct hm2_board *const board)
 static bool may_run(struct hm2_board *const board, const int64_t now_ns)
 {
     struct board_pipeline *const p = &board->pipeline;
-    if (p->rtt.total < RTT_KNOWN || board->writes < DPLL_STARTS || now_ns < p->plain_until_ns)
+    if (board->rtt.total < RTT_KNOWN || board->writes < DPLL_STARTS || now_ns < p->plain_until_ns)
         return false;
     if (board->cycles - p->looked < LOOK_EVERY)
         return false;
@@ -145,9 +145,7 @@ void board_pipeline_received(struct hm2_board *const board, const bool on_time)
     if (p->timer == 0)
         return;
     if (!p->turned) {
-        const int64_t rtt_ns = board->received_ns - board->request_ns;
-        board_rtt_add(&p->rtt, rtt_ns);
-        *p->points->data_age_us = (double)rtt_ns * 1e-3;
+        *p->points->data_age_us = (double)(board->received_ns - board->request_ns) * 1e-3;
         return;
     }
     const uint16_t waited_us = hm2_plan_facts(board->plan).waited_us;

@@ -11,8 +11,6 @@
 
 #include <hm2/points.h>
 
-#include "rtt.h"
-
 struct hm2_board;
 
 struct board_pipeline_points {
@@ -33,7 +31,6 @@ struct board_pipeline {
     int64_t plain_until_ns; /* earliest time to try again */
     int64_t pause_ns;       /* after the next fall */
     uint32_t looked;        /* cycle in which the room was computed last */
-    struct board_rtt rtt;
     struct board_pipeline_points *points;
 };
 

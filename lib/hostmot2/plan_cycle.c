@@ -116,6 +116,12 @@ const uint8_t *hm2_plan_request(struct hm2_plan *const plan, size_t *const len)
     return plan->request;
 }
 
+const uint8_t *hm2_plan_request_again(const struct hm2_plan *const plan, size_t *const len)
+{
+    *len = plan->request_len;
+    return plan->repeatable && plan->outstanding ? plan->request : NULL;
+}
+
 uint8_t *hm2_plan_reply_buffer(struct hm2_plan *const plan)
 {
     return plan->landing;

@@ -91,6 +91,7 @@ struct hm2_plan {
     size_t arrival_len, arrival_bytes; /* commands of rank ARRIVAL in the request, and their words in the reply */
     unsigned timer;                    /* of the turns; 0 = none */
     bool pipelines;                    /* turns are possible */
+    bool repeatable;                   /* no read has to happen exactly once */
 
     uint32_t write_seq, section_write_seq; /* last write, last one with sections */
     size_t fixed_len;

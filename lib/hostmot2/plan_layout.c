@@ -270,6 +270,7 @@ static int lay_out_reads(struct hm2_plan *const plan)
     lbp16_builder_init(&builder, plan->request, sizeof plan->request);
     (void)lbp16_add_write16(&builder, LBP16_SPACE_TIMER, PLAN_SCRATCH_REQUEST, 2, zero, NULL);
     plan->arrival_len = plan->arrival_bytes = 0;
+    plan->repeatable = true;
     for (unsigned first = 0; first < list->count;) {
         unsigned words;
         size_t at;
@@ -279,8 +280,10 @@ static int lay_out_reads(struct hm2_plan *const plan)
         const int err = lbp16_add_read(&builder, &command, &at);
         if (err)
             return err;
-        if (list->at[first].movable)
+        if (list->at[first].movable) {
             list->at[first].window->address = address;
+            plan->repeatable = false;
+        }
         if (list->at[first].rank == HM2_RANK_ARRIVAL) {
             plan->arrival_len = builder.used - PLAN_NUMBER_BYTES;
             plan->arrival_bytes = builder.reply_bytes;

@@ -28,6 +28,7 @@ static void nothing_given_takes_everything_the_firmware_has(void **state)
         assert_int_equal(config.sserial_baudrate, -1);
         assert_false(config.use_serial_numbers);
         assert_int_equal(config.pipelined, 0);
+        assert_false(config.adaptive_timeout || config.second_request);
         assert_string_equal(config.ssi_format[31], "");
     }
 }
@@ -77,6 +78,14 @@ static void a_whole_line_of_a_machine_is_read(void **state)
     assert_string_equal(config.fanuc_format[31], "AA64");
     assert_string_equal(config.biss_format[0], "e%32Ml%32L");
     assert_string_equal(config.ssi_format[31], "");
+}
+
+static void a_second_request_needs_the_adaptive_deadline(void **state)
+{
+    (void)state;
+    const struct hm2_config one = parse("adaptive_timeout"), both = parse("second_request");
+    assert_true(one.adaptive_timeout && !one.second_request);
+    assert_true(both.adaptive_timeout && both.second_request);
 }
 
 static void smart_serial_ports_are_counted_up_to_the_highest_digit(void **state)
@@ -172,6 +181,7 @@ int main(void)
         cmocka_unit_test(every_count_has_its_key),
         cmocka_unit_test(numbers_follow_strtol_with_base_0),
         cmocka_unit_test(a_whole_line_of_a_machine_is_read),
+        cmocka_unit_test(a_second_request_needs_the_adaptive_deadline),
         cmocka_unit_test(smart_serial_ports_are_counted_up_to_the_highest_digit),
         cmocka_unit_test(what_is_not_exactly_right_is_refused_with_the_token),
         cmocka_unit_test(every_problem_of_a_string_is_reported),
