@@ -134,6 +134,7 @@ struct hm2_module *hm2_board_module(struct hm2_board *const board, const uint8_t
 void hm2_board_change_begin(struct hm2_board *const board)
 {
     board->outstanding = false;
+    board_pipeline_stop(board);
     hm2_plan_reopen(board->plan);
 }
 

@@ -9,8 +9,11 @@
 #include <hm2/board.h>
 #include <hm2/module.h>
 
+#include "adaptive.h"
 #include "flight.h"
 #include "notice.h"
+#include "pipeline.h"
+#include "rtt.h"
 
 #define BOARD_STEM_SIZE   8u
 #define BOARD_PREFIX_SIZE 32u
@@ -96,6 +99,9 @@ enum board_event_kind {
     BOARD_EVENT_POWER_LOSS,       /* the card lost its state */
     BOARD_EVENT_RESTORED,         /* and was set up again */
     BOARD_EVENT_FOREIGN_FIRMWARE, /* words: enum board_foreign_word */
+    BOARD_EVENT_PIPELINE_RUNS,    /* words: enum board_pipeline_word */
+    BOARD_EVENT_PIPELINE_FALLS,   /* the same: too many replies were late */
+    BOARD_EVENT_PIPELINE_NO_ROOM, /* the same: a period is too short for it */
     BOARD_EVENTS
 };
 
@@ -113,6 +119,14 @@ enum board_foreign_word {
     BOARD_FOREIGN_CONFIG,         /* two words of text */
     BOARD_FOREIGN_BOARD = 2,      /* two words of text */
     BOARD_FOREIGN_FINGERPRINT = 4 /* low word first */
+};
+
+enum board_pipeline_word {
+    BOARD_PIPELINE_WORK_US,
+    BOARD_PIPELINE_WAIT_US,
+    BOARD_PIPELINE_RTT_US,
+    BOARD_PIPELINE_PERIOD_US,
+    BOARD_PIPELINE_LATE,
 };
 
 /* Words of HM2_NOTICE_WATCHDOG_BIT, which the board adds. */
@@ -162,6 +176,10 @@ struct hm2_board {
     /* the cycle */
     bool outstanding, sent; /* a request waits for read(); it could be sent */
     int64_t request_ns, period_ns;
+    int64_t read_ns; /* when read began, or the plain request it waits for was sent */
+    struct board_pipeline pipeline;
+    struct board_adaptive adaptive;
+    struct board_rtt rtt;                       /* of plain requests, while one of these two uses it */
     int64_t received_ns;                        /* of the good reply to the last request; 0 = none */
     int64_t read_limit_ns, limit_for_period_ns; /* how long a reply is waited for, and what that was computed from */
     int32_t limit_for_setting;
@@ -216,6 +234,6 @@ void board_stay_bitten(struct hm2_board *board, bool bitten);
 
 void board_start_modules(struct hm2_board *board);
 /* Facts of the present cycle; valid until the next call. */
-const struct hm2_cycle *board_cycle(struct hm2_board *board, int64_t now_ns, bool bitten);
+struct hm2_cycle *board_cycle(struct hm2_board *board, int64_t now_ns, bool bitten);
 
 #endif

@@ -13,6 +13,7 @@
 #define MAX_TOKEN 256u
 #define MAX_COUNT 1000     /* more than any firmware can hold: instances are a byte, resolvers come in sixes */
 #define MAX_BAUD  10000000 /* of smart serial */
+#define MAX_TIMER 4        /* of the DPLL */
 #define MAX_WIDTH 8        /* stepgen pins (hal-interface 1.2) */
 
 static const char *const count_keys[HM2_CFG_COUNTS] = {
@@ -148,6 +149,28 @@ static void take_serial_numbers(struct scan *const scan, const unsigned unused, 
     scan->config->use_serial_numbers = true;
 }
 
+static void take_adaptive(struct scan *const scan, const unsigned unused, const char *const value)
+{
+    (void)unused;
+    (void)value;
+    scan->config->adaptive_timeout = true;
+}
+
+static void take_second_request(struct scan *const scan, const unsigned unused, const char *const value)
+{
+    (void)unused;
+    (void)value;
+    scan->config->adaptive_timeout = scan->config->second_request = true;
+}
+
+static void take_pipelined(struct scan *const scan, const unsigned unused, const char *const value)
+{
+    (void)unused;
+    long number;
+    if (take_number(scan, value, 0, MAX_TIMER, &number))
+        scan->config->pipelined = (unsigned)number;
+}
+
 /* ---- ssi_chan_N=FORMAT and its kin ---------------------------------------------------------------------------------
  */
 
@@ -195,6 +218,9 @@ static const struct key keys[] = {
     {"firmware", 0, true, take_nothing}, /* Ethernet cards boot from flash */
     {"sserial_baudrate", 0, true, take_baudrate},
     {"use_serial_numbers", 0, false, take_serial_numbers},
+    {"pipelined", 0, true, take_pipelined},
+    {"adaptive_timeout", 0, false, take_adaptive},
+    {"second_request", 0, false, take_second_request},
     {"sserial_port_", HM2_CFG_SSERIAL_PORTS, true, take_sserial},
     {"ssi_chan_", HM2_CFG_CHANNELS, true, take_ssi},
     {"biss_chan_", HM2_CFG_CHANNELS, true, take_biss},

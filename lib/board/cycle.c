@@ -7,6 +7,7 @@
 #include "board_private.h"
 
 #define DEFAULT_PERIOD_NS 1000000
+#define LONG_AGO          INT64_MIN /* a deadline that is over: take what is queued already */
 /* A module that changes its set-up in every cycle must not hold the return of a card up for ever. */
 #define MAX_RESTORE_WRITES 256u
 
@@ -20,7 +21,7 @@ static void count(hm2_u32_t *const pin)
     *pin = *pin + 1u;
 }
 
-const struct hm2_cycle *board_cycle(struct hm2_board *const board, const int64_t now_ns, const bool bitten)
+struct hm2_cycle *board_cycle(struct hm2_board *const board, const int64_t now_ns, const bool bitten)
 {
     struct hm2_cycle *const cycle = &board->cycle;
     if (cycle->period_ns != board->period_ns) {
@@ -28,6 +29,7 @@ const struct hm2_cycle *board_cycle(struct hm2_board *const board, const int64_t
         cycle->period_s = (double)board->period_ns * 1e-9;
     }
     cycle->now_ns = now_ns;
+    cycle->age_s = 0.0;
     cycle->writes = board->writes;
     cycle->bitten = bitten;
     return cycle;
@@ -86,7 +88,8 @@ static inline void send_request(struct hm2_board *const board, const int64_t per
     size_t len = board->identity.builder.used;
     const uint8_t *const bytes = identity ? board_recovery_request(board) : hm2_plan_request(board->plan, &len);
     board->period_ns = period_ns > 0 ? period_ns : DEFAULT_PERIOD_NS;
-    board->notices.now_ns = board->request_ns = link_now_ns(board->link);
+    board->notices.now_ns = board->read_ns = board->request_ns = link_now_ns(board->link);
+    board->pipeline.turned = false;
     board->sent = link_send(board->link, bytes, len) == 0;
     board->outstanding = true;
     if (board->flight)
@@ -160,14 +163,13 @@ static int64_t deadline_ns(struct hm2_board *const board)
     const int32_t setting = *board->points->read_timeout;
     if (setting != board->limit_for_setting || board->period_ns != board->limit_for_period_ns)
         take_read_limit(board, setting);
-    return board->request_ns + board->read_limit_ns;
+    return board->read_ns + board->read_limit_ns;
 }
 
 /* Wait for the reply that judge_() takes. clock_ns: see link.h. */
-static inline bool receive(struct hm2_board *const board, const struct board_buffer into, int64_t clock_ns,
-                           bool (*const judge_)(struct hm2_board *board, size_t len))
+static inline bool receive(struct hm2_board *const board, const struct board_buffer into, const int64_t end_ns,
+                           int64_t clock_ns, bool (*const judge_)(struct hm2_board *board, size_t len))
 {
-    const int64_t end_ns = deadline_ns(board);
     for (unsigned i = 0; i < BOARD_MAX_DATAGRAMS; i++, clock_ns = LINK_CLOCK_UNREAD) {
         const int len = link_recv_from(board->link, into.bytes, into.size, end_ns, clock_ns);
         if (len >= 0) {
@@ -182,10 +184,36 @@ static inline bool receive(struct hm2_board *const board, const struct board_buf
     return false;
 }
 
+/* A reply that is later than usual is taken for lost, and asked for once more where that is wanted. */
+static bool receive_adaptively(struct hm2_board *const board, const int64_t end_ns, const int64_t clock_ns)
+{
+    const int64_t patience_ns = board_adaptive_patience_ns(board, end_ns - board->request_ns);
+    const int64_t first_ns = board->request_ns + patience_ns;
+    if (receive(board, board->reply, first_ns, clock_ns, judge))
+        return true;
+    if (first_ns >= end_ns || !board_adaptive_ask_again(board))
+        return false;
+    const int64_t second_ns = first_ns + patience_ns;
+    return receive(board, board->reply, second_ns < end_ns ? second_ns : end_ns, LINK_CLOCK_UNREAD, judge);
+}
+
+static inline bool receive_reply(struct hm2_board *const board, const int64_t clock_ns)
+{
+    const int64_t end_ns = deadline_ns(board);
+    return board->adaptive.on ? receive_adaptively(board, end_ns, clock_ns)
+                              : receive(board, board->reply, end_ns, clock_ns, judge);
+}
+
+/* The reply to a turn should have been here for long: then it is taken without asking the clock or waiting. */
+static bool receive_turn(struct hm2_board *const board, bool *const on_time)
+{
+    *on_time = receive(board, board->reply, LONG_AGO, LINK_CLOCK_UNREAD, judge);
+    return *on_time || receive(board, board->reply, deadline_ns(board), LINK_CLOCK_UNREAD, judge);
+}
+
 static void measure_round_trip(struct hm2_board *const board)
 {
     const struct board_points *const p = board->points;
-    board->received_ns = link_now_ns(board->link);
     const double us = (double)(board->received_ns - board->request_ns) * 1e-3;
     *p->rtt_us = us;
     if (*p->rtt_reset || !board->rtt_known) {
@@ -206,10 +234,20 @@ static void note_loss(struct hm2_board *const board)
     board->last_loss_cycle = board->cycles;
 }
 
+static void date_back(const struct hm2_board *const board, struct hm2_cycle *const cycle)
+{
+    cycle->now_ns = board_pipeline_sample_ns(board);
+    const int64_t age_ns = board->read_ns - cycle->now_ns;
+    cycle->age_s = age_ns > 0 ? (double)age_ns * 1e-9 : 0.0;
+}
+
 static void unpack_all(struct hm2_board *const board)
 {
     const bool bitten = hm2_watchdog_bitten(board->watchdog); /* as the cycle before has found */
-    call_all(&board->unpacks, board_cycle(board, board->request_ns, bitten));
+    struct hm2_cycle *const cycle = board_cycle(board, board->request_ns, bitten);
+    if (board->pipeline.turned)
+        date_back(board, cycle);
+    call_all(&board->unpacks, cycle);
     *board->points->data_age = 0;
     if (bitten || board->bitten)
         board_stay_bitten(board, bitten);
@@ -278,14 +316,66 @@ HM2_RARE static void lose_reply(struct hm2_board *const board)
 HM2_RARE static void read_identity(struct hm2_board *const board)
 {
     const struct board_buffer into = {board->identity.reply, sizeof board->identity.reply};
-    if (!board->sent || !receive(board, into, LINK_CLOCK_UNREAD, judge_identity)) {
+    if (!board->sent || !receive(board, into, deadline_ns(board), LINK_CLOCK_UNREAD, judge_identity)) {
         lose_reply(board);
         return;
     }
     board->outstanding = false;
+    board->received_ns = link_now_ns(board->link);
     measure_round_trip(board);
     board_recovery_identified(board);
     board_cycle_failed(board, false);
+}
+
+/* A turn was sent in the period before; for the recorder, its cycle begins here. */
+static void begin_turned_read(struct hm2_board *const board, const int64_t period_ns)
+{
+    board->period_ns = period_ns > 0 ? period_ns : DEFAULT_PERIOD_NS;
+    board->notices.now_ns = board->read_ns = link_now_ns(board->link);
+    if (board->flight)
+        board_flight_begin(board->flight, board->read_ns, board->read_ns, board->period_ns, 0, bad_datagrams(board));
+}
+
+static void take_reply(struct hm2_board *const board, const bool on_time)
+{
+    board->outstanding = false;
+    board->received_ns = link_now_ns(board->link);
+    board_pipeline_received(board, on_time);
+}
+
+static void note_plain_reply(struct hm2_board *const board)
+{
+    if (board->adaptive.on)
+        board_adaptive_received(board);
+    if (!board->adaptive.asked_again)
+        board_rtt_add(&board->rtt, board->received_ns - board->request_ns);
+}
+
+static void read_plain(struct hm2_board *const board, const int64_t clock_ns)
+{
+    if (!board->sent || !receive_reply(board, clock_ns)) {
+        if (board->adaptive.on)
+            board_adaptive_lost(board);
+        lose_reply(board);
+        return;
+    }
+    take_reply(board, true);
+    if (board->adaptive.on || board->pipeline.timer > 0)
+        note_plain_reply(board);
+    measure_round_trip(board);
+    use_reply(board);
+}
+
+static void finish_turn(struct hm2_board *const board)
+{
+    bool on_time;
+    if (!receive_turn(board, &on_time)) {
+        board_pipeline_lost(board);
+        lose_reply(board);
+        return;
+    }
+    take_reply(board, on_time);
+    use_reply(board);
 }
 
 void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
@@ -293,6 +383,7 @@ void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
     if (is_stopped(board)) {
         if (board->outstanding)
             give_up(board);
+        board_pipeline_stop(board);
         if (board->state == BOARD_RUNS)
             board_rearm_io(board);
         return;
@@ -301,6 +392,8 @@ void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
     if (!board->outstanding) {
         send_request(board, period_ns);
         clock_ns = board->request_ns;
+    } else if (board->pipeline.turned) {
+        begin_turned_read(board, period_ns);
     }
     board->cycles++;
     board->received_ns = 0;
@@ -308,12 +401,10 @@ void hm2_board_read(struct hm2_board *const board, const int64_t period_ns)
     *board->points->strangers = (uint32_t)link_strangers(board->link);
     if (board->recovery == BOARD_ASKS_IDENTITY) {
         read_identity(board);
-    } else if (!board->sent || !receive(board, board->reply, clock_ns, judge)) {
-        lose_reply(board);
+    } else if (board->pipeline.turned) {
+        finish_turn(board);
     } else {
-        board->outstanding = false;
-        measure_round_trip(board);
-        use_reply(board);
+        read_plain(board, clock_ns);
     }
     if (board->flight)
         record_read(board);
@@ -333,14 +424,21 @@ void hm2_board_write(struct hm2_board *const board, const int64_t period_ns)
     /* A card that comes back drives nothing until a person has seen it. */
     call_all(&board->packs, board_cycle(board, now_ns, restores || hm2_watchdog_bitten(board->watchdog)));
     size_t len;
-    const uint8_t *const bytes = hm2_plan_write(board->plan, &len);
+    const bool turns = board_pipeline_turns(board, now_ns);
+    const uint8_t *const bytes =
+        turns ? hm2_plan_turn(board->plan, board_pipeline_timeout_us(board), &len) : hm2_plan_write(board->plan, &len);
     if (board->writes > 0 && now_ns - board->write_ns > board->write_gap_ns)
         board->write_gap_ns = now_ns - board->write_ns;
     board->write_ns = now_ns;
     board->writes++;
     if (link_send(board->link, bytes, len) < 0) {
         hm2_plan_write_failed(board->plan);
+        if (turns)
+            hm2_plan_give_up(board->plan);
         note_loss(board);
+    } else if (turns) {
+        board->outstanding = board->pipeline.turned = true;
+        board->request_ns = now_ns;
     }
     if (board->flight)
         board_flight_written(board->flight, now_ns, link_now_ns(board->link), len);

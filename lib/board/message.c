@@ -169,6 +169,17 @@ static void say_foreign(const struct text *const text, const uint32_t *const wor
         (unsigned)(board->idrom.fingerprint >> 32), (unsigned)board->idrom.fingerprint);
 }
 
+static void say_pipeline(const struct text *const text, const char *const what, const uint32_t *const words)
+{
+    SAY(text,
+        "%s: %s. Of a period of %u us the thread needs up to %u us until it writes, the card waits up to %u us, "
+        "packets "
+        "are on their way for %u us; %u replies were late so far",
+        text->board->prefix, what, (unsigned)words[BOARD_PIPELINE_PERIOD_US], (unsigned)words[BOARD_PIPELINE_WORK_US],
+        (unsigned)words[BOARD_PIPELINE_WAIT_US], (unsigned)words[BOARD_PIPELINE_RTT_US],
+        (unsigned)words[BOARD_PIPELINE_LATE]);
+}
+
 static bool say_event(const struct text *const text, const struct board_event *const event)
 {
     const char *const prefix = text->board->prefix;
@@ -194,6 +205,20 @@ static bool say_event(const struct text *const text, const struct board_event *c
     case BOARD_EVENT_FOREIGN_FIRMWARE:
         say_foreign(text, event->words);
         return true;
+    case BOARD_EVENT_PIPELINE_RUNS:
+        say_pipeline(text, "the cycle is pipelined now", event->words);
+        return false;
+    case BOARD_EVENT_PIPELINE_FALLS:
+        say_pipeline(text, "too many replies came late: plain cycles again, the pipelined one is tried again later",
+                     event->words);
+        return false;
+    case BOARD_EVENT_PIPELINE_NO_ROOM:
+        say_pipeline(
+            text,
+            "plain cycles: the pipelined one has no room, or the DPLL timer's offset is not between 1 us and a "
+            "third of the period",
+            event->words);
+        return false;
     case BOARD_EVENTS:
         break;
     }

@@ -45,9 +45,36 @@ static const struct hm2_point flight_points[] = {
 };
 #define FLIGHT_POINTS (sizeof flight_points / sizeof flight_points[0])
 
+#define L(field, name, type, dir, init, unit, help) \
+    HM2_POINT(struct board_pipeline_points, field, name, type, dir, init, unit, help)
+
+static const struct hm2_point pipeline_points[] = {
+    L(active, "pipeline.active", HM2_BIT, HM2_PIN_OUT, 0, "", "1 = inputs are read ahead; 0 = plain cycles"),
+    L(margin_us, "pipeline.margin-us", HM2_FLOAT, HM2_PIN_OUT, 0, "us",
+      "time that nearly every reply is there before it is read; negative = the read waited so long"),
+    L(data_age_us, "pipeline.data-age-us", HM2_FLOAT, HM2_PIN_OUT, 0, "us", "age of the inputs when they are read"),
+    L(wait_us, "pipeline.wait-us", HM2_U32, HM2_PIN_OUT, 0, "us", "time that the card has waited for its timer"),
+    L(late, "pipeline.late", HM2_U32, HM2_PIN_OUT, 0, "cycles", "replies that the read had to wait for"),
+    L(falls, "pipeline.falls", HM2_U32, HM2_PIN_OUT, 0, "", "returns to plain cycles because replies were late"),
+};
+#define PIPELINE_POINTS (sizeof pipeline_points / sizeof pipeline_points[0])
+
+#define A(field, name, type, dir, init, unit, help) \
+    HM2_POINT(struct board_adaptive_points, field, name, type, dir, init, unit, help)
+
+static const struct hm2_point adaptive_points[] = {
+    A(deadline_us, "adaptive.deadline-us", HM2_FLOAT, HM2_PIN_OUT, 0, "us",
+      "time after the request at which its reply is taken for lost"),
+    A(requests, "adaptive.requests", HM2_U32, HM2_PIN_OUT, 0, "packets", "second requests in a cycle"),
+    A(saved, "adaptive.saved", HM2_U32, HM2_PIN_OUT, 0, "cycles", "cycles that had a good reply after one"),
+};
+#define ADAPTIVE_POINTS (sizeof adaptive_points / sizeof adaptive_points[0])
+
 static const struct hm2_point_group groups[] = {
     {"", points, sizeof points / sizeof points[0], NULL},
     {"", flight_points, FLIGHT_POINTS, "with flight_folder="},
+    {"", pipeline_points, PIPELINE_POINTS, "with pipelined= in config"},
+    {"", adaptive_points, ADAPTIVE_POINTS, "with adaptive_timeout or second_request in config"},
     {NULL, NULL, 0, NULL},
 };
 
@@ -56,22 +83,47 @@ const struct hm2_point_group *hm2_board_point_groups(void)
     return groups;
 }
 
+/* bound: memory from the host, or NULL when it gave none. */
+static int bind_table(const struct hm2_board *const board, struct hm2_binder *const binder,
+                      const struct hm2_point *const table, const size_t count, void *const bound,
+                      struct hm2_diag *const diag)
+{
+    if (!bound)
+        return hm2_diag_add(diag, HM2_ERR_NOMEM, "%s: the host gave no memory for the points %s and on", board->prefix,
+                            table[0].name);
+    return hm2_bind_points(binder, table, count, bound, board->prefix, 0, diag);
+}
+
 static int bind_flight(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
 {
     struct board_flight_points *const bound = binder->alloc(binder, sizeof *bound);
-    if (!bound)
-        return hm2_diag_add(diag, HM2_ERR_NOMEM, "%s: the host gave no memory for the recorder's points",
-                            board->prefix);
     board->flight->points = bound;
-    return hm2_bind_points(binder, flight_points, FLIGHT_POINTS, bound, board->prefix, 0, diag);
+    return bind_table(board, binder, flight_points, FLIGHT_POINTS, bound, diag);
+}
+
+static int bind_pipeline(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
+{
+    struct board_pipeline_points *const bound = binder->alloc(binder, sizeof *bound);
+    board->pipeline.points = bound;
+    return bind_table(board, binder, pipeline_points, PIPELINE_POINTS, bound, diag);
+}
+
+static int bind_adaptive(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
+{
+    struct board_adaptive_points *const bound = binder->alloc(binder, sizeof *bound);
+    board->adaptive = (struct board_adaptive){.on = true, .asks_again = board->config.second_request, .points = bound};
+    return bind_table(board, binder, adaptive_points, ADAPTIVE_POINTS, bound, diag);
 }
 
 int board_points_bind(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
 {
     board->points = binder->alloc(binder, sizeof *board->points);
-    if (!board->points)
-        return hm2_diag_add(diag, HM2_ERR_NOMEM, "%s: the host gave no memory for the board's points", board->prefix);
-    const int err =
-        hm2_bind_points(binder, points, sizeof points / sizeof points[0], board->points, board->prefix, 0, diag);
-    return err == 0 && board->flight ? bind_flight(board, binder, diag) : err;
+    int err = bind_table(board, binder, points, sizeof points / sizeof points[0], board->points, diag);
+    if (err == 0 && board->flight)
+        err = bind_flight(board, binder, diag);
+    if (err == 0 && board->config.pipelined > 0)
+        err = bind_pipeline(board, binder, diag);
+    if (err == 0 && board->config.adaptive_timeout)
+        err = bind_adaptive(board, binder, diag);
+    return err;
 }

@@ -28,6 +28,7 @@ enum board_bite_reason board_bite_reason(const struct hm2_board *const board)
 void board_recovery_begin(struct hm2_board *const board)
 {
     board->recovery = BOARD_ASKS_IDENTITY;
+    board_pipeline_stop(board);
     board_event(board, BOARD_EVENT_POWER_LOSS, &(struct board_event){.instance = 0});
 }
 

@@ -323,8 +323,26 @@ static int create_objects(struct hm2_board *const board, struct hm2_binder *cons
         err = setup_modules(board, &setup);
     if (err == 0)
         err = hm2_plan_freeze(board->plan, diag);
+    if (err == 0 && board->config.pipelined > 0 && !hm2_plan_pipelines(board->plan))
+        hm2_diag_warn(diag,
+                      "%s: config pipelined=%u has no effect: what a cycle writes and what it asks for do not fit into "
+                      "one datagram. Use fewer module instances",
+                      board->prefix, board->config.pipelined);
     prepare_cycle(board);
     return err;
+}
+
+static int prepare_pipeline(struct hm2_board *const board, struct hm2_diag *const diag)
+{
+    const unsigned timer = board->config.pipelined;
+    if (timer == 0)
+        return 0;
+    if (instances_of(&board->idrom, HM2_GTAG_DPLL) == 0 || board->config.count[HM2_CFG_DPLLS] == 0)
+        return hm2_diag_add(
+            diag, HM2_ERR_INVALID, "%s: config pipelined=%u found, but no DPLL is %s; the card has nothing to wait for",
+            board->prefix, timer, board->config.count[HM2_CFG_DPLLS] == 0 ? "used (num_dplls=0)" : "in the firmware");
+    board->pipeline.timer = timer;
+    return hm2_plan_pipeline(board->plan, timer, diag);
 }
 
 /* The identity request of a card that comes back is prepared here: the cycle only changes its number. */
@@ -348,7 +366,7 @@ int hm2_board_setup(struct hm2_board *const board, const unsigned index, struct 
         return err;
     hm2_plan_init(board->plan, board->nonce);
     const int checks[] = {check_counts(board, diag), check_serial(board, diag), match_modules(board, diag),
-                          prepare_identity(board)};
+                          prepare_identity(board), prepare_pipeline(board, diag)};
     for (size_t i = 0; i < sizeof checks / sizeof checks[0]; i++)
         if (checks[i] < 0)
             return checks[i];

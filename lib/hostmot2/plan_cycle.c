@@ -99,7 +99,7 @@ void hm2_plan_touch_all(struct hm2_plan *const plan)
 
 /* ---- request and reply ------------------------------------------------------------------------------------------- */
 
-const uint8_t *hm2_plan_request(struct hm2_plan *const plan, size_t *const len)
+void plan_begin_request(struct hm2_plan *const plan)
 {
     plan->request_seq = next_seq(plan->request_seq);
     plan->requests++;
@@ -107,8 +107,19 @@ const uint8_t *hm2_plan_request(struct hm2_plan *const plan, size_t *const len)
     plan->outstanding = true;
     plan->write_at_request = plan->write_seq;
     hm2_put_le32(plan->request + PLAN_COMMAND_BYTES, plan->request_seq);
+}
+
+const uint8_t *hm2_plan_request(struct hm2_plan *const plan, size_t *const len)
+{
+    plan_begin_request(plan);
     *len = plan->request_len;
     return plan->request;
+}
+
+const uint8_t *hm2_plan_request_again(const struct hm2_plan *const plan, size_t *const len)
+{
+    *len = plan->request_len;
+    return plan->repeatable && plan->outstanding ? plan->request : NULL;
 }
 
 uint8_t *hm2_plan_reply_buffer(struct hm2_plan *const plan)
@@ -168,6 +179,17 @@ static void settle_session(struct hm2_plan *const plan, const uint32_t shown)
         plan->facts.session_kept = false;
 }
 
+/* An older write was carried out after the ones that brought these. A turn's own number hides that, so it also reads
+ * the number that it found. */
+HM2_RARE static void resend_undone(struct hm2_plan *const plan, const uint32_t found)
+{
+    for (unsigned i = 0; i < plan->section_count; i++) {
+        const struct plan_section *const entry = &plan->sections[i];
+        if (in_state(plan, i, PLAN_CLEAN) && !entry->on_demand && hm2_delta32(entry->write_seq, found) > 0)
+            move(plan, i, PLAN_DIRTY);
+    }
+}
+
 static void accept(struct hm2_plan *const plan)
 {
     memcpy(plan->reply, plan->landing, plan->reply_len);
@@ -184,7 +206,9 @@ static void accept(struct hm2_plan *const plan)
 
 enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
 {
-    if (len != plan->reply_len)
+    bool is_turn;
+    uint8_t extra[PLAN_EXTRA_BYTES] = {0};
+    if (plan_unfold_turn(plan, len, &is_turn, extra) != plan->reply_len)
         return HM2_REPLY_MALFORMED;
     const uint8_t *const trailer = plan->landing + plan->reply_len - PLAN_TRAILER_BYTES;
     const uint64_t age = requests_since(plan, hm2_get_le32(trailer + PLAN_TRAILER_REQUEST));
@@ -200,6 +224,10 @@ enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
         plan->late_request = age < 64 && number > plan->requests_before ? number : 0;
         return HM2_REPLY_LATE;
     }
+    const uint32_t found = hm2_get_le32(extra + PLAN_EXTRA_BEFORE);
+    if (is_turn && hm2_delta32(plan->section_write_seq, found) > 0)
+        resend_undone(plan, found);
+    plan->facts.waited_us = hm2_get_le16(extra + PLAN_EXTRA_WAITED);
     accept(plan);
     return HM2_REPLY_FRESH;
 }
@@ -246,7 +274,7 @@ static size_t add_sections(struct hm2_plan *const plan, size_t used, const size_
     return used;
 }
 
-const uint8_t *hm2_plan_write(struct hm2_plan *const plan, size_t *const len)
+size_t plan_compose_write(struct hm2_plan *const plan, const size_t most)
 {
     size_t used = plan->fixed_len;
     plan->write_seq = next_seq(plan->write_seq);
@@ -257,10 +285,15 @@ const uint8_t *hm2_plan_write(struct hm2_plan *const plan, size_t *const len)
         plan->session_write_seq = plan->write_seq;
     }
     if (!is_empty(&plan->in_state[PLAN_DIRTY]))
-        used = add_sections(plan, used, sizeof plan->write - PLAN_NUMBER_BYTES);
+        used = add_sections(plan, used, most - PLAN_NUMBER_BYTES);
     hm2_put_le32(plan->number_command + PLAN_COMMAND_BYTES, plan->write_seq);
     memcpy(plan->write + used, plan->number_command, PLAN_NUMBER_BYTES);
-    *len = used + PLAN_NUMBER_BYTES;
+    return used + PLAN_NUMBER_BYTES;
+}
+
+const uint8_t *hm2_plan_write(struct hm2_plan *const plan, size_t *const len)
+{
+    *len = plan_compose_write(plan, sizeof plan->write);
     return plan->write;
 }
 

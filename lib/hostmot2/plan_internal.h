@@ -32,7 +32,12 @@ enum {
     PLAN_NUMBER_BYTES = 8,          /* write of one number */
     PLAN_SESSION_BYTES = 6 + 8,     /* HM2Timeout = 0, session number */
     PLAN_REQUEST_BYTES = 8 + 2 * 4, /* write of the sequence number and the two reads of the trailer */
+    PLAN_BEFORE_BYTES = 4,          /* of a turn: read of the number of the write before */
+    PLAN_WAIT_BYTES = 6 + 4 + 6,    /* HM2Timeout, the wait, HM2Timeout */
 };
+
+/* What a turn's reply has more than a plain one, behind the windows of rank ARRIVAL. */
+enum { PLAN_EXTRA_BEFORE = 0, PLAN_EXTRA_WAITED = 4, PLAN_EXTRA_BYTES = 6 };
 
 struct plan_window {
     struct hm2_window *window;
@@ -83,6 +88,10 @@ struct hm2_plan {
     bool outstanding;
     uint32_t write_at_request; /* write_seq when the last request was made */
     size_t request_len, reply_len;
+    size_t arrival_len, arrival_bytes; /* commands of rank ARRIVAL in the request, and their words in the reply */
+    unsigned timer;                    /* of the turns; 0 = none */
+    bool pipelines;                    /* turns are possible */
+    bool repeatable;                   /* no read has to happen exactly once */
 
     uint32_t write_seq, section_write_seq; /* last write, last one with sections */
     size_t fixed_len;
@@ -98,8 +107,20 @@ struct hm2_plan {
     uint8_t reply[LBP16_MAX_REPLY_BYTES]; /* the last fresh one */
     uint8_t landing[PLAN_REPLY_CAPACITY];
     uint8_t write[LBP16_MAX_REQUEST_BYTES];
+    uint8_t turn[LBP16_MAX_REQUEST_BYTES];
+    uint8_t turn_before[PLAN_BEFORE_BYTES], turn_wait[PLAN_WAIT_BYTES];
     uint8_t setup[HM2_PLAN_SETUP_BYTES];
 };
+
+/* A new request: its number, and what is known of the ones before. */
+void plan_begin_request(struct hm2_plan *plan);
+/* The write of this cycle, of at most `most` bytes; returns its length. */
+size_t plan_compose_write(struct hm2_plan *plan, size_t most);
+/* len bytes in the landing: when they are the reply to a turn, give them the shape of a plain one and keep what it had
+ * more. Returns the length that is left. */
+size_t plan_unfold_turn(struct hm2_plan *plan, size_t len, bool *is_turn, uint8_t extra[PLAN_EXTRA_BYTES]);
+/* Once the packets are laid out. */
+void plan_prepare_turn(struct hm2_plan *plan);
 
 /* What plan.h promises to those who provide the memory. */
 _Static_assert(sizeof(struct hm2_plan) <= (size_t)24 << 10, "a plan is about 24 KiB");

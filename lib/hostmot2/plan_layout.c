@@ -269,6 +269,8 @@ static int lay_out_reads(struct hm2_plan *const plan)
     struct lbp16_builder builder;
     lbp16_builder_init(&builder, plan->request, sizeof plan->request);
     (void)lbp16_add_write16(&builder, LBP16_SPACE_TIMER, PLAN_SCRATCH_REQUEST, 2, zero, NULL);
+    plan->arrival_len = plan->arrival_bytes = 0;
+    plan->repeatable = true;
     for (unsigned first = 0; first < list->count;) {
         unsigned words;
         size_t at;
@@ -278,8 +280,14 @@ static int lay_out_reads(struct hm2_plan *const plan)
         const int err = lbp16_add_read(&builder, &command, &at);
         if (err)
             return err;
-        if (list->at[first].movable)
+        if (list->at[first].movable) {
             list->at[first].window->address = address;
+            plan->repeatable = false;
+        }
+        if (list->at[first].rank == HM2_RANK_ARRIVAL) {
+            plan->arrival_len = builder.used - PLAN_NUMBER_BYTES;
+            plan->arrival_bytes = builder.reply_bytes;
+        }
         for (; first < end; first++) {
             list->at[first].window->bytes = plan->reply + at;
             at += 4u * list->at[first].words;
@@ -380,6 +388,7 @@ int hm2_plan_freeze(struct hm2_plan *const plan, struct hm2_diag *const diag)
     if (!err) {
         carry_words(&plan->reads, reply);
         carry_words(&plan->writes, write);
+        plan_prepare_turn(plan);
     }
     plan->frozen = !err;
     return err;

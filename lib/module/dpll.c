@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "bind.h"
+#include "dpll.h"
 #include "module_types.h"
 
 enum { REG_BASE_RATE, REG_PHASE, REG_CONTROL0, REG_CONTROL1, REG_TIMERS12, REG_TIMERS34, REG_SYNC };
@@ -72,7 +73,7 @@ static int add_registers(struct dpll *const ctx, const struct hm2_md *const md, 
         {&ctx->timers12, REG_TIMERS12, 0},   {&ctx->timers34, REG_TIMERS34, 0},
     };
     int err =
-        hm2_plan_add_read(setup->plan, &ctx->sync, HM2_RANK_FIRST, hm2_md_address(md, REG_SYNC, 0), 1, setup->diag);
+        hm2_plan_add_read(setup->plan, &ctx->sync, HM2_RANK_ARRIVAL, hm2_md_address(md, REG_SYNC, 0), 1, setup->diag);
     if (err == 0)
         err = hm2_plan_add_read(setup->plan, &ctx->control1_read, HM2_RANK_NORMAL, hm2_md_address(md, REG_CONTROL1, 0),
                                 1, setup->diag);
@@ -195,6 +196,19 @@ HM2_RARE static void hold_at_zero(struct dpll *const ctx)
 {
     hm2_section_touch(&ctx->phase);
     hm2_section_touch(&ctx->control0); /* writing it clears the filtered phase error (tests/data/hm2dpll) */
+}
+
+int64_t hm2_dpll_timer_ns(const struct hm2_module *const module, const unsigned timer)
+{
+    const struct dpll *const ctx = module ? module->context : NULL;
+    const double offset_us = ctx ? *ctx->timer[timer - 1].offset_us : 0.0;
+    return isfinite(offset_us) && fabs(offset_us) < 1e9 ? (int64_t)(offset_us * 1e3) : 0;
+}
+
+void hm2_dpll_align(struct hm2_module *const module)
+{
+    if (module && module->context)
+        hold_at_zero(module->context);
 }
 
 static bool is_unchanged(const struct dpll *const ctx, const struct hm2_cycle *const cycle)

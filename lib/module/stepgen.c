@@ -190,7 +190,10 @@ static void start(struct hm2_module *const module, const struct hm2_cycle *const
     ctx->started = true;
 }
 
-static inline void unpack_all(struct stepgen_module *const ctx, const unsigned instances, const bool has_latch)
+/* The card steps at the rate that it was given, so that where a generator is by now follows from where it was when the
+ * registers were read. */
+static inline void unpack_all(struct stepgen_module *const ctx, const unsigned instances, const double age_s,
+                              const bool has_latch)
 {
     const uint8_t *accumulators = ctx->accumulators.bytes;
     for (struct stepgen *gen = ctx->generator, *const end = gen + instances; gen < end; gen++, accumulators += 4) {
@@ -204,7 +207,7 @@ static inline void unpack_all(struct stepgen_module *const ctx, const unsigned i
             stepgen_unpack_latch(gen, hm2_window_get(&ctx->latches, gen->number));
         if (*gen->position_reset)
             gen->subcounts = 0;
-        gen->position = (double)gen->subcounts * (1.0 / SUBCOUNTS_PER_STEP) / gen->scale;
+        gen->position = (double)gen->subcounts * (1.0 / SUBCOUNTS_PER_STEP) / gen->scale + gen->velocity * age_s;
         *gen->counts = (int32_t)(uint32_t)((uint64_t)gen->subcounts >> 16);
         *gen->position_fb = gen->position;
     }
@@ -212,14 +215,13 @@ static inline void unpack_all(struct stepgen_module *const ctx, const unsigned i
 
 static void unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
-    (void)cycle;
     struct stepgen_module *const ctx = module->context;
     if (!ctx)
         return;
     if (ctx->has_latch)
-        unpack_all(ctx, module->instances, true);
+        unpack_all(ctx, module->instances, cycle->age_s, true);
     else
-        unpack_all(ctx, module->instances, false);
+        unpack_all(ctx, module->instances, cycle->age_s, false);
 }
 
 static const struct hm2_md_variant variants[] = {

@@ -211,6 +211,7 @@ static bool receive(struct sim_lbp16 *const e, const size_t bytes)
     }
     sim_lbp16_spend(e, CLOCKS_RECEIVE + (unsigned)(rounded / 4) * CLOCKS_COPY);
     e->CONTROL(LBP16_CONTROL_RX_PACKETS)++;
+    e->asked_ns = 0;
     return true;
 }
 
@@ -579,6 +580,11 @@ int64_t sim_card_clock_at(const struct sim_card *const card, const int64_t now_n
 void sim_card_set_instant(struct sim_card *const card, const bool instant)
 {
     card->lbp16->instant = instant;
+}
+
+int64_t sim_card_asked_ns(const struct sim_card *const card)
+{
+    return card->lbp16->asked_ns;
 }
 
 void sim_card_mac(const struct sim_card *const card, uint8_t mac[6])

@@ -40,6 +40,7 @@ struct sim_lbp16 {
     bool has_epoch; /* epoch_ns belongs to epoch_clk */
     int64_t epoch_ns, epoch_clk;
     int64_t now_ns;      /* how far the processor has come */
+    int64_t asked_ns;    /* of that, what the last packet asked it to wait */
     bool instant;        /* its instructions take no time */
     int64_t ready_ns;    /* hears nothing before */
     uint64_t stamp_zero; /* start of the microsecond counter, in ns */

@@ -96,13 +96,19 @@ static enum sim_verdict eeprom_access(struct sim_lbp16 *const e, const unsigned 
 
 /* ---- space 4: time stamp, waits, scratch ------------------------------------------------------------------------ */
 
+static void wait_ns(struct sim_lbp16 *const e, const int64_t ns)
+{
+    e->now_ns += ns;
+    e->asked_ns += ns;
+}
+
 /* Time passes until the stamp has counted on by `ticks` from `start` (both 16 bits wide). */
 static void wait_ticks(struct sim_lbp16 *const e, const uint16_t start, const uint16_t ticks)
 {
     const uint16_t gone = (uint16_t)(sim_lbp16_stamp(e) - start);
     if (gone < ticks) {
         const uint64_t into_tick = ((uint64_t)e->now_ns + e->stamp_zero) % 1000u;
-        e->now_ns += (int64_t)(ticks - gone) * 1000 - (int64_t)into_tick;
+        wait_ns(e, (int64_t)(ticks - gone) * 1000 - (int64_t)into_tick);
     }
     sim_lbp16_spend(e, CLOCKS_TIMER_POLL);
 }
@@ -113,12 +119,12 @@ static uint16_t wait_for_timer(struct sim_lbp16 *const e, const unsigned timer)
     const uint16_t start = sim_lbp16_stamp(e);
     const uint16_t timeout = e->timer[LBP16_TIMER_TIMEOUT_US / 2];
     const int64_t from_clk = sim_lbp16_clk(e, e->now_ns);
-    const int64_t rise_clk = sim_dpll_next_rise(e->card, timer, from_clk);
+    const int64_t rise_clk = timeout > 0 ? sim_dpll_next_rise(e->card, timer, from_clk) : SIM_NEVER;
     const int64_t limit_ns = e->now_ns + (int64_t)timeout * 1000;
     const int64_t limit_clk = sim_lbp16_clk(e, limit_ns);
-    if (rise_clk <= limit_clk && timeout > 0) {
+    if (rise_clk <= limit_clk) {
         const int64_t clock_ns = 1000000000 / (int64_t)sim_clock_low_hz(e->card);
-        e->now_ns += (rise_clk - from_clk) * clock_ns;
+        wait_ns(e, (rise_clk - from_clk) * clock_ns);
         sim_lbp16_spend(e, CLOCKS_TIMER_POLL);
     } else {
         wait_ticks(e, start, timeout);

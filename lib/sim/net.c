@@ -10,7 +10,7 @@
 #define ON_THE_WAY   64u
 #define INBOX        64u
 #define MAX_DELAY_NS 1000000000
-#define LONG_WORK_NS 200000   /* a full packet takes 150 us: more than this was asked for */
+#define LONG_WORK_NS 200000   /* a full packet takes 150 us: more than this is the flash's doing */
 #define HOLD_NS      10000000 /* a datagram held back for the next to overtake goes on after this */
 
 enum direction { TO_CARD, TO_CLIENT };
@@ -64,7 +64,9 @@ static bool happens(struct sim_net *const net, const double probability)
 static int64_t draw_delay(struct sim_net *const net)
 {
     const uint64_t span = (uint64_t)(net->faults.delay_max_ns - net->faults.delay_min_ns) + 1;
-    return net->faults.delay_min_ns + (int64_t)sim_prng_below(&net->random, span);
+    const int64_t delay_ns = net->faults.delay_min_ns + (int64_t)sim_prng_below(&net->random, span);
+    /* Without a tail nothing is drawn for it: seeds keep what they give. */
+    return net->faults.tail > 0.0 && happens(net, net->faults.tail) ? delay_ns + net->faults.tail_ns : delay_ns;
 }
 
 static struct datagram *enqueue(struct sim_net *const net, const enum direction direction, const int64_t due_ns,
@@ -193,10 +195,11 @@ static void to_card(struct sim_net *const net, const struct datagram *const d)
     tell_taken(net, d, false);
     const size_t len = sim_card_packet(net->card, net->now_ns, d->data, d->len, reply, sizeof reply, &reply_ns);
     tell_taken(net, d, true);
-    const bool at_once = net->instant && reply_ns - net->now_ns < LONG_WORK_NS;
+    const int64_t waited_ns = sim_card_asked_ns(net->card);
+    const bool at_once = net->instant && reply_ns - net->now_ns - waited_ns < LONG_WORK_NS;
     net->client = d->client;
     if (len > 0 && !d->foreign)
-        carry(net, TO_CLIENT, at_once ? net->now_ns : reply_ns, reply, len);
+        carry(net, TO_CLIENT, at_once ? net->now_ns + waited_ns : reply_ns, reply, len);
 }
 
 /* Index in waiting[] of the datagram that is due next, waiting_count when there is none. */
@@ -313,7 +316,9 @@ static bool probability(const double p)
 int sim_faults_check(const struct sim_faults *const f)
 {
     if (!probability(f->loss) || !probability(f->duplicate) || !probability(f->reorder) || !probability(f->truncate) ||
-        !probability(f->foreign))
+        !probability(f->foreign) || !probability(f->tail))
+        return HM2_ERR_RANGE;
+    if (f->tail_ns < 0 || f->tail_ns > MAX_DELAY_NS)
         return HM2_ERR_RANGE;
     if (f->delay_min_ns < 0 || f->delay_max_ns > MAX_DELAY_NS || f->delay_min_ns > f->delay_max_ns)
         return HM2_ERR_RANGE;

@@ -7,10 +7,11 @@
  *     bench_cycle echo  ADDRESS PORT REQUEST_BYTES REPLY_BYTES WRITE_BYTES CYCLES
  *     bench_cycle serve ADDRESS PORT REQUEST_BYTES REPLY_BYTES
  *
- * DRIVER is hm2_lbp16, or hm2_eth (LinuxCNC's, with hostmot2 before it). The component is loaded into the small HAL
- * host in this process; a 1 kHz thread calls PREFIX.read and PREFIX.write with marks of our own around them.
- * Instructions are counted by single-stepping that thread from another process: exact, and without the kernel's share.
- * `echo` exchanges packets of the same sizes with `serve`, with nothing but the system calls.
+ * DRIVER is hm2_lbp16, or hm2_eth (LinuxCNC's, with hostmot2 before it). PREFIX names the first card, "hm2_7i93.0", or
+ * with "*N" behind it the first of N cards of its kind, whose .read and then .write stand in one thread. The component
+ * is loaded into the small HAL host in this process; a 1 kHz thread calls PREFIX.read and PREFIX.write with marks of
+ * our own around them. Instructions are counted by single-stepping that thread from another process: exact, and without
+ * the kernel's share. `echo` exchanges packets of the same sizes with `serve`, with nothing but the system calls.
  */
 #include <arpa/inet.h>
 #include <errno.h>
@@ -34,7 +35,8 @@
 #include "table.h"
 
 #define PERIOD_NS  1000000L
-#define WARM_UP    300
+#define WARM_UP    600 /* until pipelined cycles have begun */
+#define MAX_CARDS  16
 #define CLIENT_CPU 1
 #define SERVER_CPU 0
 
@@ -125,7 +127,8 @@ static struct shared *shared;
 static int64_t mark_ns[3];
 static int64_t *read_times, *write_times;
 static int wanted_cycles, seen_cycles;
-static hal_u32_t **errors;
+static hal_u32_t **errors; /* of each card */
+static unsigned cards = 1;
 
 static void mark_begin(void *const arg, const long period)
 {
@@ -152,7 +155,10 @@ static void mark_end(void *const arg, const long period)
         read_times[at] = mark_ns[1] - mark_ns[0];
         write_times[at] = mark_ns[2] - mark_ns[1];
     }
-    shared->errors = **errors;
+    unsigned sum = 0;
+    for (unsigned i = 0; i < cards; i++)
+        sum += *errors[i];
+    shared->errors = sum;
     shared->cycle++;
 }
 
@@ -162,8 +168,14 @@ static int marks_main(void *const block)
 {
     (void)block;
     marks_id = hal_init("marks");
-    errors = marks_id < 0 ? NULL : hal_malloc(sizeof *errors);
-    if (!errors || hal_pin_u32_new("mark.errors", HAL_IN, errors, marks_id) != 0)
+    errors = marks_id < 0 ? NULL : hal_malloc(MAX_CARDS * (long)sizeof *errors);
+    for (unsigned i = 0; errors && i < cards; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "mark.errors.%u", i);
+        if (hal_pin_u32_new(name, HAL_IN, &errors[i], marks_id) != 0)
+            return -1;
+    }
+    if (!errors)
         return -1;
     hal_export_funct("mark.begin", mark_begin, NULL, 1, 0, marks_id);
     hal_export_funct("mark.middle", mark_middle, NULL, 1, 0, marks_id);
@@ -222,12 +234,12 @@ static void enable_all(const char *const prefix, const char *const module)
 
 /* All that the driver has is in use: axes under position control, PWM on. Replies may take as long as they want, and
  * nothing bites, because a driver that is stepped through is slow and a busy machine is late. */
-static void put_to_work(const char *const prefix)
+static void put_to_work(const char *const prefix, const unsigned card)
 {
     char text[128];
     setp(prefix, "packet-read-timeout", "2000000000");
     setp(prefix, "watchdog.timeout_ns", "4000000000");
-    snprintf(text, sizeof text, "net errors %s.packet-error-total => mark.errors\n", prefix);
+    snprintf(text, sizeof text, "net errors.%u %s.packet-error-total => mark.errors.%u\n", card, prefix, card);
     command(text);
     enable_all(prefix, "stepgen");
     enable_all(prefix, "pwmgen");
@@ -241,9 +253,32 @@ static uintptr_t code_of(const char *const prefix, const char *const suffix)
     return funct ? (uintptr_t)funct->code : 0;
 }
 
-static void start_driver(const char *const name, const char *const prefix, const char *const folder,
+/* "hm2_7i93.0*4": the prefixes of the cards, and how many there are. */
+static void take_prefixes(const char *const text, char prefixes[MAX_CARDS][64])
+{
+    const char *const star = strchr(text, '*');
+    const char *const dot = strrchr(text, '.');
+    cards = star ? (unsigned)strtoul(star + 1, NULL, 10) : 1;
+    if (!dot || cards < 1 || cards > MAX_CARDS) {
+        fprintf(stderr, "bench_cycle: %s is no prefix of 1 to %d cards\n", text, MAX_CARDS);
+        exit(2);
+    }
+    for (unsigned i = 0; i < cards; i++)
+        snprintf(prefixes[i], sizeof prefixes[i], "%.*s.%u", (int)(dot - text), text, i);
+}
+
+static void add_all(char prefixes[MAX_CARDS][64], const char *const suffix)
+{
+    for (unsigned i = 0; i < cards; i++)
+        add(prefixes[i], suffix);
+}
+
+static void start_driver(const char *const name, const char *const text, const char *const folder,
                          char **const arguments, const int count)
 {
+    char prefixes[MAX_CARDS][64];
+    const char *const prefix = prefixes[0];
+    take_prefixes(text, prefixes);
     static const char *folders[3];
     char name_argument[] = "name1=servo", period_argument[] = "period1=1000000";
     char *thread_arguments[] = {name_argument, period_argument};
@@ -261,13 +296,14 @@ static void start_driver(const char *const name, const char *const prefix, const
     if (strcmp(name, "hm2_eth") == 0)
         load("hostmot2", NULL, 0);
     load(name, arguments, count);
-    put_to_work(prefix);
+    for (unsigned i = 0; i < cards; i++)
+        put_to_work(prefixes[i], i);
     shared->read = code_of(prefix, ".read");
     shared->write = code_of(prefix, ".write");
     add("mark", ".begin");
-    add(prefix, ".read");
+    add_all(prefixes, ".read");
     add("mark", ".middle");
-    add(prefix, ".write");
+    add_all(prefixes, ".write");
     add("mark", ".end");
     if (halhost_start(&diag) != 0) {
         fprintf(stderr, "bench_cycle: %s", diag.text);

@@ -341,15 +341,15 @@ static void a_wait_that_another_program_left_on_the_card_does_not_hold_set_up_up
 /* ---- cost of a cycle -----------------------------------------------------------------------------------------------
  */
 
-static void a_cycle_allocates_nothing_and_moves_exactly_its_packets(void **state)
+/* datagrams: that a cycle sends. */
+static void count_cost(struct fixture *const f, const char *const config, const unsigned datagrams)
 {
-    struct fixture *const f = *state;
     enum { CYCLES = 5000 };
-    load(f, NULL);
+    load(f, config);
     set(f, "stepgen.00.enable", 1);
     set(f, "stepgen.00.maxaccel", 100);
     set(f, "pwmgen.00.enable", 1);
-    cycles(f, 200); /* the DPLL sends its set-up for a while */
+    cycles(f, 600); /* the DPLL sends its set-up for a while, and a pipelined cycle begins */
     const struct link_counters before = f->link->counters;
     const unsigned long allocated = allocations;
     for (unsigned i = 0; i < CYCLES; i++) {
@@ -357,11 +357,21 @@ static void a_cycle_allocates_nothing_and_moves_exactly_its_packets(void **state
         set(f, "pwmgen.00.value", i * 0.0001);
         cycle(f);
     }
-    assert_int_equal(f->link->counters.sent - before.sent, 2 * CYCLES);
+    assert_int_equal(f->link->counters.sent - before.sent, datagrams * CYCLES);
     assert_int_equal(f->link->counters.received - before.received, CYCLES);
     assert_int_equal(allocations, allocated);
     assert_true(!COUNTS_ALLOCATIONS || allocated > 0);
     assert_true(get(f, "packet-error-total") == 0);
+}
+
+static void a_cycle_allocates_nothing_and_moves_exactly_its_packets(void **state)
+{
+    count_cost(*state, NULL, 2);
+}
+
+static void so_does_a_pipelined_one(void **state)
+{
+    count_cost(*state, "pipelined=4", 1);
 }
 
 #define TEST(function) cmocka_unit_test_setup_teardown(function, set_up, tear_down)
@@ -377,6 +387,7 @@ int main(void)
         TEST(encoder_positions_do_not_jump_when_the_power_fails),
         TEST(a_wait_that_another_program_left_on_the_card_does_not_hold_set_up_up),
         TEST(a_cycle_allocates_nothing_and_moves_exactly_its_packets),
+        TEST(so_does_a_pipelined_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

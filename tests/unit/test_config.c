@@ -27,6 +27,8 @@ static void nothing_given_takes_everything_the_firmware_has(void **state)
         assert_int_equal(hm2_config_sserial_ports(&config, 3), 3);
         assert_int_equal(config.sserial_baudrate, -1);
         assert_false(config.use_serial_numbers);
+        assert_int_equal(config.pipelined, 0);
+        assert_false(config.adaptive_timeout || config.second_request);
         assert_string_equal(config.ssi_format[31], "");
     }
 }
@@ -60,7 +62,8 @@ static void a_whole_line_of_a_machine_is_read(void **state)
     (void)state;
     const struct hm2_config config = parse(" num_encoders=1\tnum_stepgens=5  stepgen_width=4 sserial_port_1=0x3\n"
                                            "enable_raw firmware=hm2/7i96/sv.bit ssi_chan_3=nul%1bmpos%24ge\v"
-                                           "fanuc_chan_31=AA64 biss_chan_0=e%32Ml%32L ");
+                                           "fanuc_chan_31=AA64 biss_chan_0=e%32Ml%32L pipelined=3");
+    assert_int_equal(config.pipelined, 3);
     assert_int_equal(config.count[HM2_CFG_ENCODERS], 1);
     assert_int_equal(config.count[HM2_CFG_STEPGENS], 5);
     assert_int_equal(config.stepgen_width, 4);
@@ -75,6 +78,14 @@ static void a_whole_line_of_a_machine_is_read(void **state)
     assert_string_equal(config.fanuc_format[31], "AA64");
     assert_string_equal(config.biss_format[0], "e%32Ml%32L");
     assert_string_equal(config.ssi_format[31], "");
+}
+
+static void a_second_request_needs_the_adaptive_deadline(void **state)
+{
+    (void)state;
+    const struct hm2_config one = parse("adaptive_timeout"), both = parse("second_request");
+    assert_true(one.adaptive_timeout && !one.second_request);
+    assert_true(both.adaptive_timeout && both.second_request);
 }
 
 static void smart_serial_ports_are_counted_up_to_the_highest_digit(void **state)
@@ -107,6 +118,8 @@ static void what_is_not_exactly_right_is_refused_with_the_token(void **state)
     } cases[] = {
         {"num_encoders=3x", "config: \"num_encoders=3x\": a whole number from -1 to 1000 is expected after \"=\", "
                             "\"3x\" found"},
+        {"pipelined=5", "\"pipelined=5\": a whole number from 0 to 4 is expected"},
+        {"pipelined", "\"=\" and a value are expected"},
         {"num_encoders=", "\"num_encoders=\": a whole number"},
         {"num_encoders", "\"num_encoders\": a whole number"},
         {"num_encoders=-2", "\"-2\" found"},
@@ -168,6 +181,7 @@ int main(void)
         cmocka_unit_test(every_count_has_its_key),
         cmocka_unit_test(numbers_follow_strtol_with_base_0),
         cmocka_unit_test(a_whole_line_of_a_machine_is_read),
+        cmocka_unit_test(a_second_request_needs_the_adaptive_deadline),
         cmocka_unit_test(smart_serial_ports_are_counted_up_to_the_highest_digit),
         cmocka_unit_test(what_is_not_exactly_right_is_refused_with_the_token),
         cmocka_unit_test(every_problem_of_a_string_is_reported),

@@ -237,6 +237,30 @@ static void a_frozen_card_says_nothing_and_goes_on_after(void **state)
     drop(&rig);
 }
 
+/* Writes a wait of so many microseconds, and reads a word. */
+static int64_t time_of_wait(const struct rig *const rig, const uint8_t us)
+{
+    struct link *const link = sim_net_link(rig->net);
+    const uint8_t request[] = {0x01, 0xD1, 0x02, 0x00, us, 0x00, 0x01, 0x51, 0x10, 0x00};
+    uint8_t reply[16];
+    const int64_t begin_ns = link_now_ns(link);
+    assert_int_equal(link_send(link, request, sizeof request), 0);
+    assert_int_equal(link_recv(link, reply, sizeof reply, begin_ns + MS), 2);
+    return link_now_ns(link) - begin_ns;
+}
+
+static void an_instant_network_still_waits_as_long_as_it_is_asked_to(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(NULL);
+    sim_net_set_instant(rig.net, true);
+    assert_int_equal(time_of_wait(&rig, 0), 0);
+    assert_in_range(time_of_wait(&rig, 100), 99000, 100000);
+    assert_in_range(time_of_wait(&rig, 250), 249000, 250000);
+    assert_int_equal(time_of_wait(&rig, 0), 0);
+    drop(&rig);
+}
+
 static void a_power_cycle_costs_a_second(void **state)
 {
     (void)state;
@@ -271,8 +295,10 @@ static void faults_out_of_range_are_refused(void **state)
     (void)state;
     struct rig rig = rig_with(NULL);
     const struct sim_faults bad[] = {
-        {.loss = 1.01},       {.duplicate = -0.1},         {.reorder = 2},
-        {.truncate = -1},     {.foreign = 1e300},          {.delay_min_ns = 5, .delay_max_ns = 4},
+        {.loss = 1.01},       {.duplicate = -0.1},
+        {.reorder = 2},       {.tail = 2},
+        {.tail_ns = -1},      {.truncate = -1},
+        {.foreign = 1e300},   {.delay_min_ns = 5, .delay_max_ns = 4},
         {.delay_min_ns = -1}, {.delay_max_ns = INT64_MAX},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
@@ -292,6 +318,7 @@ int main(void)
         cmocka_unit_test(the_card_counts_what_reached_it),
         cmocka_unit_test(the_same_seed_gives_the_same_faults),
         cmocka_unit_test(a_frozen_card_says_nothing_and_goes_on_after),
+        cmocka_unit_test(an_instant_network_still_waits_as_long_as_it_is_asked_to),
         cmocka_unit_test(a_power_cycle_costs_a_second),
         cmocka_unit_test(a_card_that_was_idle_starts_as_slowly),
         cmocka_unit_test(faults_out_of_range_are_refused),

@@ -50,6 +50,9 @@ struct hm2_config {
     uint8_t sserial_named[HM2_CFG_SSERIAL_PORTS];  /* channels that the token names; the rest have their default */
     int sserial_baudrate;                          /* -1 = as the firmware has it */
     bool use_serial_numbers;                       /* names of smart-serial remotes by unit number */
+    unsigned pipelined;                            /* DPLL timer of the pipelined cycle, 1..4; 0 = plain cycles */
+    bool adaptive_timeout;                         /* replies are given up when they are later than usual */
+    bool second_request;                           /* and are then asked for once more; implies adaptive_timeout */
     char ssi_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];
     char biss_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];
     char fanuc_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];

@@ -24,9 +24,10 @@
 
 /* Facts of the present cycle, the same for every module of a card. */
 struct hm2_cycle {
-    int64_t now_ns;    /* link's clock, when the request was sent (unpack) or the write is packed (pack) */
+    int64_t now_ns;    /* link's clock, when the inputs were asked for (unpack) or the write is packed (pack) */
     int64_t period_ns; /* of the thread, > 0 */
     double period_s;
+    double age_s;    /* unpack: what the inputs are older than this cycle; 0 unless pipelined */
     uint32_t writes; /* write cycles since load or since the last restart; 0 = this is the first */
     bool bitten;     /* the card's watchdog has bitten and was not yet cleared: outputs are off */
 };

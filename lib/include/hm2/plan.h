@@ -27,6 +27,13 @@
  * more than once, never not at all. When the card carries an older write out after a newer one (the network changed
  * their order), all sections that the newer one had brought are sent again.
  *
+ * Pipelined (docs/pipelined-cycle.md), write and request travel as one datagram, in which the card waits for a timer of
+ * its DPLL before it reads:
+ *
+ *   turn:     reads of rank ARRIVAL, read of space 4 0x0014, the write as above, HM2Timeout = t, read of the wait
+ *             register, HM2Timeout = 0, the rest of the request
+ *   reply:    windows of rank ARRIVAL, number of the write before this one, microseconds waited, the rest of the reply
+ *
  * After freeze, all functions are realtime safe. One thread at a time.
  */
 #ifndef HM2_PLAN_H
@@ -46,7 +53,14 @@
 
 /* Order inside a packet; the FPGA processes a packet from front to back. Equal ranks: by address (windows) or in the
  * order of registration (sections). Only windows of one rank and with adjacent addresses share a command. */
-enum hm2_rank { HM2_RANK_FIRST = 0, HM2_RANK_EARLY = 1, HM2_RANK_NORMAL = 2, HM2_RANK_LATE = 3, HM2_RANK_LAST = 4 };
+enum hm2_rank {
+    HM2_RANK_ARRIVAL, /* reads: the moment counts at which the datagram reaches the card; see hm2_plan_turn() */
+    HM2_RANK_FIRST,
+    HM2_RANK_EARLY,
+    HM2_RANK_NORMAL,
+    HM2_RANK_LATE,
+    HM2_RANK_LAST
+};
 
 /* A run of 32-bit registers inside a cyclic packet. Lives in its module's memory and must not move. */
 struct hm2_window {
@@ -122,6 +136,12 @@ HM2_API int HM2_MUST_CHECK hm2_plan_add_setup(struct hm2_plan *plan, struct hm2_
  * HM2_ERR_MISMATCH when two windows write the same register with the same rank. */
 HM2_API int HM2_MUST_CHECK hm2_plan_freeze(struct hm2_plan *plan, struct hm2_diag *diag);
 
+/* Before freeze: turns will be made, which wait for DPLL timer 1..4. HM2_ERR_RANGE for another timer. */
+HM2_API int HM2_MUST_CHECK hm2_plan_pipeline(struct hm2_plan *plan, unsigned timer, struct hm2_diag *diag);
+/* After freeze: turns were asked for and are possible. They are not when write and request do not fit into one
+ * datagram, or when there are queues to be read: their words answer writes that need more time than the card waits. */
+HM2_API bool hm2_plan_pipelines(const struct hm2_plan *plan);
+
 /* After freeze: windows and sections can be added once more, then freeze again. Nothing may use the plan in between; a
  * request that is outstanding is given up. Words in windows and what is known of the sections stay. When the second
  * freeze fails, no cycle can be run any more. */
@@ -147,6 +167,9 @@ HM2_API void hm2_plan_touch_all(struct hm2_plan *plan);
 /* Request for this cycle (next sequence number). The pointer stays valid until the next call. A request that is still
  * outstanding is given up. */
 HM2_API const uint8_t *hm2_plan_request(struct hm2_plan *plan, size_t *len);
+/* The request that is outstanding, to be sent once more: whichever reply comes first is FRESH, the other STALE. NULL when
+ * the plan reads what goes away by being read, or may: queues, and registers that are chosen in the cycle. */
+HM2_API const uint8_t *hm2_plan_request_again(const struct hm2_plan *plan, size_t *len);
 /* Buffer to receive into: hm2_plan_reply_capacity() bytes, larger than a good reply so that a long one is noticed. */
 HM2_API uint8_t *hm2_plan_reply_buffer(struct hm2_plan *plan);
 HM2_API size_t hm2_plan_reply_capacity(const struct hm2_plan *plan);
@@ -172,6 +195,7 @@ struct hm2_plan_facts {
     bool session_kept;    /* false: the card lost its scratch registers, i.e. its power or its firmware. False from
                            * then on, until hm2_plan_touch_all() */
     uint16_t card_rx_udp; /* UDP packets the card has received, modulo 2^16 */
+    uint16_t waited_us;   /* how long the card has waited for its timer; 0 for the reply to a plain request */
 };
 HM2_API struct hm2_plan_facts hm2_plan_facts(const struct hm2_plan *plan);
 
@@ -179,6 +203,10 @@ HM2_API struct hm2_plan_facts hm2_plan_facts(const struct hm2_plan *plan);
  * sequence number. What did not fit stays dirty for the next cycle, in order. The pointer stays valid until the next
  * call. */
 HM2_API const uint8_t *hm2_plan_write(struct hm2_plan *plan, size_t *len);
+/* hm2_plan_write() and hm2_plan_request() in one datagram, when hm2_plan_pipelines(). The card carries the write out,
+ * waits for the rising edge of its timer, at most timeout_us, and answers. A fresh reply therefore confirms the write.
+ * The pointer stays valid until the next call. */
+HM2_API const uint8_t *hm2_plan_turn(struct hm2_plan *plan, uint16_t timeout_us, size_t *len);
 /* The write could not be sent: its sections are dirty again. */
 HM2_API void hm2_plan_write_failed(struct hm2_plan *plan);
 

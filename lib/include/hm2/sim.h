@@ -160,6 +160,8 @@ HM2_API void sim_card_set_instant(struct sim_card *card, bool instant);
  * leaves in *reply_ns (may be NULL). A card that is busy with an earlier packet takes this one afterwards. */
 HM2_API size_t sim_card_packet(struct sim_card *card, int64_t now_ns, const uint8_t *request, size_t request_len,
                                uint8_t *reply, size_t capacity, int64_t *reply_ns);
+/* How long the last packet has asked the card to wait: space 4's waits. */
+HM2_API int64_t sim_card_asked_ns(const struct sim_card *card);
 /* The same with whole Ethernet frames, without checksums as the firmware sees and makes them: ARP for the card's
  * address, ICMP echo, UDP. Frames are taken as they are (Ethernet pads to 60 bytes: the caller's affair). */
 HM2_API size_t sim_card_frame(struct sim_card *card, int64_t now_ns, const uint8_t *frame, size_t frame_len,
@@ -177,9 +179,11 @@ struct sim_faults {
     uint64_t seed;
     double loss, duplicate, reorder, truncate, foreign; /* probability per datagram, each direction, 0..1 */
     int64_t delay_min_ns, delay_max_ns;                 /* uniform, on top of the card's own time; 0..1 s */
+    double tail;                                        /* probability that a datagram takes tail_ns longer; 0..1 */
+    int64_t tail_ns;                                    /* 0..1 s */
 };
 
-/* 0, or HM2_ERR_RANGE for a probability outside 0..1, or delays outside 0..1 s or with min > max. */
+/* 0, or HM2_ERR_RANGE for a probability outside 0..1, or times outside 0..1 s or with min > max. */
 HM2_API int HM2_MUST_CHECK sim_faults_check(const struct sim_faults *faults);
 
 struct sim_net;
@@ -218,8 +222,8 @@ HM2_API void sim_net_on_deliver(struct sim_net *net, sim_net_deliver_fn fn, void
 HM2_API void sim_net_arrive(struct sim_net *net, int64_t now_ns, uint64_t client, const uint8_t *data, size_t len);
 /* When the next datagram on its way is due; INT64_MAX when there is none. */
 HM2_API int64_t sim_net_next_ns(const struct sim_net *net);
-/* Replies leave as soon as they are made, without the tens of microseconds that the card takes (not so when a packet
- * asked the card to wait). For programs, whose host adds times of its own. */
+/* Replies leave as soon as they are made, without the tens of microseconds that the card takes (but not before the card
+ * has waited as long as the packet asked it to). For programs, whose host adds times of its own. */
 HM2_API void sim_net_set_instant(struct sim_net *net, bool instant);
 
 #endif
