@@ -130,6 +130,7 @@ static bool load(const struct load *const load, const char *const driver)
     write_file(folder, "load.hal", text);
     snprintf(hal, sizeof hal, "%s/load.hal", folder);
     ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
+    ck_assert_int_eq(setenv("PEER_DRIVER", driver, 1), 0);
     const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer",
                                 TEST_BUILD,
                                 folder,
