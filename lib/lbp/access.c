@@ -47,26 +47,16 @@ static int port_write(void *const context, const uint16_t address, const unsigne
     return sslbp_remote_write(at->port, at->channel, address, bytes, value);
 }
 
-static int port_unsupported(const struct lbp_port_channel *const at)
-{
-    return hm2_diag_add(at->port->diag, HM2_ERR_UNSUPPORTED,
-                        "%s: firmware is updated over a serial line only, with the remote's set-up jumper.",
-                        at->port->name);
-}
-
 static int port_memory(void *const context, const enum lbp_memory memory)
 {
     const struct lbp_port_channel *const at = context;
-    if (memory == LBP_MEMORY_FLASH)
-        return port_unsupported(at);
-    return sslbp_nonvolatile(at->port, at->channel, memory == LBP_MEMORY_EEPROM);
+    return sslbp_memory(at->port, at->channel, (uint8_t)memory);
 }
 
 static int port_local(void *const context, const enum lbp_local code, uint8_t *const value)
 {
-    (void)code;
-    *value = 0;
-    return port_unsupported(context);
+    const struct lbp_port_channel *const at = context;
+    return sslbp_remote_local(at->port, at->channel, (uint8_t)code, value);
 }
 
 struct lbp_access lbp_port_access(struct lbp_port_channel *const channel)

@@ -83,56 +83,86 @@ int lbp_remote_check_image(const struct lbp_remote *const remote, const uint8_t 
                         (unsigned)flash->block_bytes);
 }
 
-static int commit(const struct lbp_remote *const remote, const uint8_t how, const uint32_t offset)
+/* ---- writing ------------------------------------------------------------------------------------------------------
+ */
+
+struct update {
+    const struct lbp_remote *remote;
+    const struct lbp_flash *flash;
+    const uint8_t *image;
+    size_t len;
+    uint8_t cookie, status; /* as the remote gave them last */
+    uint8_t status_before;  /* errors of former times do not count */
+};
+
+static int ask(struct update *const u)
 {
-    uint8_t cookie = 0, status = 0;
-    int err = put(remote, AT_COMMIT, 1, how);
-    if (!err)
-        err = remote->access.local(remote->access.context, LBP_GET_COOKIE, &cookie);
-    if (!err)
-        err = remote->access.local(remote->access.context, LBP_GET_STATUS, &status);
-    if (!err && (cookie != LBP_COOKIE || status & REFUSED))
-        return hm2_diag_add(
-            remote->diag, HM2_ERR_IO,
-            "%s: %s flash at 0x%X: cookie 0x%02X and status 0x%02X found; the remote has no whole "
-            "firmware now. Its loader is untouched: repeat the update before its power is switched off.",
-            remote->name, how == COMMIT_ERASE ? "erasing" : "writing", (unsigned)offset, cookie, status);
+    const struct lbp_access *const access = &u->remote->access;
+    const int err = access->local(access->context, LBP_GET_COOKIE, &u->cookie);
+    return err ? err : access->local(access->context, LBP_GET_STATUS, &u->status);
+}
+
+/* What confirms every step must work before the first. */
+static int prove_contact(struct update *const u)
+{
+    const int err = ask(u);
+    u->status_before = u->status;
+    if (!err && u->cookie != LBP_COOKIE)
+        return hm2_diag_add(u->remote->diag, HM2_ERR_IO,
+                            "%s: cookie 0x%02X found, 0x%02X expected. Nothing has been changed.", u->remote->name,
+                            u->cookie, LBP_COOKIE);
     return err;
 }
 
-static int write_page(const struct lbp_remote *const remote, const struct lbp_flash *const flash,
-                      const uint8_t *const image, const size_t len, const uint32_t offset)
+static int commit(struct update *const u, const uint8_t how, const uint32_t offset)
 {
-    int err = put(remote, AT_OFFSET, 4, offset);
-    for (uint32_t at = 0; !err && at < flash->page_bytes; at += WRITE_BYTES) {
-        uint64_t value = 0;
-        for (unsigned i = 0; i < WRITE_BYTES; i++)
-            value |= (uint64_t)image_byte(image, len, offset + at + i) << 8u * i;
-        err = put(remote, (uint16_t)(AT_PAGE + at), WRITE_BYTES, value);
-    }
-    return err ? err : commit(remote, COMMIT_WRITE, offset);
+    int err = put(u->remote, AT_COMMIT, 1, how);
+    if (!err)
+        err = ask(u);
+    if (!err && (u->cookie != LBP_COOKIE || u->status & ~u->status_before & REFUSED))
+        return hm2_diag_add(
+            u->remote->diag, HM2_ERR_IO,
+            "%s: %s flash at 0x%X: cookie 0x%02X and status 0x%02X found; the remote has no whole "
+            "firmware now. Its loader is untouched: repeat the update before its power is switched off.",
+            u->remote->name, how == COMMIT_ERASE ? "erasing" : "writing", (unsigned)offset, u->cookie, u->status);
+    return err;
 }
 
-static int write_block(const struct lbp_remote *const remote, const struct lbp_flash *const flash,
-                       const uint8_t *const image, const size_t len, const uint32_t offset)
+static int write_page(struct update *const u, const uint32_t offset)
 {
-    int err = put(remote, AT_OFFSET, 4, offset);
+    int err = put(u->remote, AT_OFFSET, 4, offset);
+    for (uint32_t at = 0; !err && at < u->flash->page_bytes; at += WRITE_BYTES) {
+        uint64_t value = 0;
+        for (unsigned i = 0; i < WRITE_BYTES; i++)
+            value |= (uint64_t)image_byte(u->image, u->len, offset + at + i) << 8u * i;
+        err = put(u->remote, (uint16_t)(AT_PAGE + at), WRITE_BYTES, value);
+    }
+    return err ? err : commit(u, COMMIT_WRITE, offset);
+}
+
+static int write_block(struct update *const u, const uint32_t offset)
+{
+    int err = put(u->remote, AT_OFFSET, 4, offset);
     if (!err)
-        err = commit(remote, COMMIT_ERASE, offset);
-    for (uint32_t at = 0; !err && at < flash->block_bytes; at += flash->page_bytes)
-        err = write_page(remote, flash, image, len, offset + at);
+        err = commit(u, COMMIT_ERASE, offset);
+    for (uint32_t at = 0; !err && at < u->flash->block_bytes; at += u->flash->page_bytes)
+        err = write_page(u, offset + at);
     return err;
 }
 
 int lbp_remote_update(const struct lbp_remote *const remote, const struct lbp_flash *const flash,
                       const uint8_t *const image, const size_t len, const lbp_progress_fn progress, void *const context)
 {
+    struct update u = {.remote = remote, .flash = flash, .image = image, .len = len};
     if (len > LBP_IMAGE_MAX || flash->block_bytes == 0)
         return HM2_ERR_RANGE;
-    int err = set_memory(remote, LBP_MEMORY_FLASH);
+    int err = prove_contact(&u);
+    if (err)
+        return err;
+    err = set_memory(remote, LBP_MEMORY_FLASH);
     for (uint32_t at = flash->block_bytes; !err && at < len; at += flash->block_bytes) {
         if (!is_blank(flash, image, len, at))
-            err = write_block(remote, flash, image, len, at);
+            err = write_block(&u, at);
         if (!err && progress)
             progress(context, at + flash->block_bytes < len ? at + flash->block_bytes : (uint32_t)len, (uint32_t)len);
     }

@@ -287,14 +287,16 @@ static int bind_fields(const struct making *const making_, const struct sslbp_ta
 /* ---- parameters ---------------------------------------------------------------------------------------------------
  */
 
+enum { MEMORY_WORKING = 0, MEMORY_EEPROM = 1 };
+
 static int read_global(const struct sslbp_port *const access, const unsigned channel,
                        const struct sserial_global *const global, uint64_t *const raw)
 {
-    int err = global->nonvolatile ? sslbp_nonvolatile(access, channel, true) : 0;
+    int err = global->nonvolatile ? sslbp_memory(access, channel, MEMORY_EEPROM) : 0;
     if (err == 0)
         err = sslbp_remote_read(access, channel, global->address, global->bytes, raw);
     if (err == 0 && global->nonvolatile)
-        err = sslbp_nonvolatile(access, channel, false);
+        err = sslbp_memory(access, channel, MEMORY_WORKING);
     return err;
 }
 

@@ -8,7 +8,9 @@
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
 #define DEFAULT_BAUD     9u /* 2.5 Mbaud (seed 003, "OPERATE MODE BAUD RATE") */
+#define SETUP_BAUD       115200u
 #define DEFAULT_WATCHDOG 50u
+#define ERASED           0xFFu
 #define SOFTWARE_REV     14u /* as a listing of a real 7I76 has them (reference: flash tool, 1.4.5) */
 #define HARDWARE_REV     1u
 #define FIELD_V          24.0
@@ -62,6 +64,7 @@ int remote_new(struct remote **const remote, const char *const name, const uint3
     if (!r)
         return hm2_diag_add(diag, HM2_ERR_NOMEM, "no memory for a simulated remote");
     r->kind = kind;
+    memset(r->flash.bytes, ERASED, sizeof r->flash.bytes);
     put_nv(r, REMOTE_AT_NV_BAUD, DEFAULT_BAUD, 1);
     put_nv(r, REMOTE_AT_NV_UNIT_NUMBER, (uint32_t)kind->unit_class << SERIAL_BITS | (serial & 0xFFFFFFu), 4);
     put_nv(r, REMOTE_AT_NV_WATCHDOG, DEFAULT_WATCHDOG, 2);
@@ -87,7 +90,7 @@ void remote_power_up(struct remote *const r, const int64_t now_ns)
     r->memory[REMOTE_AT_SOFTWARE] = SOFTWARE_REV;
     r->memory[REMOTE_AT_HARDWARE] = HARDWARE_REV;
     r->memory[REMOTE_AT_FAULT] = REMOTE_FAULT_WATCHDOG | r->held;
-    r->nv_memory = 0;
+    r->nv_memory = REMOTE_WORKING;
     r->mode = 0;
     r->tripped = 0;
     r->fed_ns = now_ns;
@@ -116,7 +119,7 @@ uint32_t remote_baud(const struct remote *const r)
 {
     static const uint32_t rates[] = {9600,   19200,  38400,   57600,   115200,  230400,
                                      460800, 921600, 1250000, 2500000, 5000000, 10000000};
-    return rates[r->baud < COUNT(rates) ? r->baud : DEFAULT_BAUD];
+    return r->setup ? SETUP_BAUD : rates[r->baud < COUNT(rates) ? r->baud : DEFAULT_BAUD];
 }
 
 uint8_t remote_faults(const struct remote *const r)
@@ -177,11 +180,18 @@ void remote_set_nv_access(struct remote *const r, const uint8_t memory)
     r->nv_memory = memory;
 }
 
+void remote_set_jumper(struct remote *const r, const bool setup)
+{
+    r->setup = setup;
+}
+
 /* ---- inputs and outputs -------------------------------------------------------------------------------------------
  */
 
 uint8_t remote_read(struct remote *const r, const uint16_t address)
 {
+    if (r->nv_memory == REMOTE_FLASH)
+        return remote_flash_read(&r->flash, address);
     if (r->nv_memory) {
         const bool inside = address >= REMOTE_AT_NV && address < REMOTE_AT_NV + REMOTE_NV_BYTES;
         return inside ? r->nv[address - REMOTE_AT_NV] : 0;
@@ -191,6 +201,8 @@ uint8_t remote_read(struct remote *const r, const uint16_t address)
 
 bool remote_write(struct remote *const r, const uint16_t address, const uint8_t value)
 {
+    if (r->nv_memory == REMOTE_FLASH)
+        return remote_flash_write(&r->flash, address, value);
     if (r->nv_memory) {
         if (address < REMOTE_AT_NV || address >= REMOTE_AT_NV + REMOTE_NV_BYTES)
             return false;

@@ -49,7 +49,7 @@ void remote_power_up(struct remote *remote, int64_t now_ns);
 
 const char *remote_card_name(const struct remote *remote); /* four characters (LBP D0..D3) */
 uint32_t remote_unit_number(const struct remote *remote);  /* RPC BC: so the recorded firmware asks, not BB */
-uint32_t remote_baud(const struct remote *remote);         /* in operate mode, since power-up */
+uint32_t remote_baud(const struct remote *remote);         /* since power-up; 115200 with the set-up jumper */
 /* Software mode (LBP E6 as recorded). One that it does not have is a fault and leaves the old one. */
 void remote_set_mode(struct remote *remote, uint8_t mode);
 /* RPC BB, for the mode that is set. Bytes of process data without the byte of faults. */
@@ -97,6 +97,8 @@ int HM2_MUST_CHECK remote_speed(const struct remote *remote, const char *output,
 enum sim_level remote_terminal(struct remote *remote, unsigned output);
 /* Outputs (bits) that are shorted: they trip as soon as they are on. */
 void remote_short(struct remote *remote, uint32_t outputs);
+/* The set-up jumper (seed 003, "SETUP/OPERATE MODE"); off at first. */
+void remote_set_jumper(struct remote *remote, bool setup);
 /* Faults of other causes, as long as the cause lasts. */
 void remote_hold_faults(struct remote *remote, uint8_t faults);
 

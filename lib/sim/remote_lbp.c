@@ -9,12 +9,6 @@
 #define RPC_PITCH 8u
 #define WATCHDOG  REMOTE_FAULT_WATCHDOG
 
-/* Addresses while the flash is meant, and what is written to the last one. */
-enum { FLASH_OFFSET = 0x8000, FLASH_BLOCK_LOG2 = 0x8004, FLASH_PAGE_LOG2 = 0x8005, FLASH_COMMIT = 0x8007 };
-#define COMMIT_ERASE 0xFEu
-#define COMMIT_WRITE 0xFDu
-#define ERASED       0xFFu
-
 static uint8_t *local(struct remote_lbp *const line, const enum lbp_local code)
 {
     return &line->local[(unsigned)code % REMOTE_LOCALS];
@@ -35,7 +29,6 @@ static void power_up(struct remote_lbp *const line)
     *local(line, LBP_GET_VERSION) = VERSION;
     *local(line, LBP_GET_RPC_PITCH) = RPC_PITCH;
     *local(line, LBP_GET_COOKIE) = LBP_COOKIE;
-    line->memory = LBP_MEMORY_WORKING;
     line->pointer = 0;
     lbp_parser_init(&line->parser, lbp_gap_ns(LBP_LONGEST_TIMEOUT, line->baud));
     expect_process_data(line);
@@ -44,60 +37,15 @@ static void power_up(struct remote_lbp *const line)
 void remote_lbp_init(struct remote_lbp *const line, struct remote *const remote, const uint32_t baud)
 {
     *line = (struct remote_lbp){.remote = remote, .baud = baud};
-    memset(line->flash.bytes, ERASED, sizeof line->flash.bytes);
     power_up(line);
 }
 
 /* ---- memory -------------------------------------------------------------------------------------------------------
  */
 
-static bool commit(struct remote_flash *const flash, const uint8_t how)
-{
-    const uint32_t block = 1u << REMOTE_BLOCK_LOG2, page = sizeof flash->page;
-    const uint32_t unit = how == COMMIT_ERASE ? block : page;
-    if ((how != COMMIT_ERASE && how != COMMIT_WRITE) || flash->offset % unit != 0 || flash->offset < block ||
-        flash->offset >= REMOTE_FLASH_BYTES)
-        return false;
-    for (uint32_t i = 0; i < unit; i++)
-        flash->bytes[flash->offset + i] =
-            how == COMMIT_ERASE ? (uint8_t)ERASED : flash->bytes[flash->offset + i] & flash->page[i];
-    return true;
-}
-
-static bool flash_write(struct remote_flash *const flash, const uint16_t address, const uint8_t value)
-{
-    if (address == FLASH_COMMIT)
-        return commit(flash, value);
-    if (address >= FLASH_OFFSET && address < FLASH_BLOCK_LOG2) {
-        const unsigned shift = 8u * (address - FLASH_OFFSET);
-        flash->offset = (flash->offset & ~(UINT32_C(0xFF) << shift)) | (uint32_t)value << shift;
-        return true;
-    }
-    if (address >= sizeof flash->page)
-        return false;
-    flash->page[address] = value;
-    return true;
-}
-
-static uint8_t flash_read(const struct remote_flash *const flash, const uint16_t address)
-{
-    if (address == FLASH_BLOCK_LOG2)
-        return REMOTE_BLOCK_LOG2;
-    if (address == FLASH_PAGE_LOG2)
-        return REMOTE_PAGE_LOG2;
-    return address < sizeof flash->page ? flash->page[address] : 0;
-}
-
-static uint8_t read_byte(struct remote_lbp *const line, const uint16_t address)
-{
-    return line->memory == LBP_MEMORY_FLASH ? flash_read(&line->flash, address) : remote_read(line->remote, address);
-}
-
 static void write_byte(struct remote_lbp *const line, const uint16_t address, const uint8_t value)
 {
-    const bool good = line->memory == LBP_MEMORY_FLASH ? flash_write(&line->flash, address, value)
-                                                       : remote_write(line->remote, address, value);
-    if (!good)
+    if (!remote_write(line->remote, address, value))
         *local(line, LBP_GET_STATUS) |= LBP_STATUS_WRITE;
 }
 
@@ -113,7 +61,7 @@ static size_t access_data(struct remote_lbp *const line, const struct lbp_comman
         if (command->code & LBP_WRITE)
             write_byte(line, (uint16_t)(line->pointer + i), command->data[i]);
         else
-            answer[i] = read_byte(line, (uint16_t)(line->pointer + i));
+            answer[i] = remote_read(line->remote, (uint16_t)(line->pointer + i));
     }
     if (command->code & LBP_INCREMENT)
         line->pointer = (uint16_t)(line->pointer + bytes);
@@ -152,7 +100,6 @@ static void set_local(struct remote_lbp *const line, const uint8_t code, const u
         remote_clear_faults(line->remote, value);
         break;
     case LBP_SET_NV_ACCESS:
-        line->memory = value;
         remote_set_nv_access(line->remote, value);
         break;
     case LBP_SET_TIMEOUT:

@@ -5,14 +5,27 @@
 
 #include "remote_kind.h"
 
-#define REMOTE_MAX_FIELDS 32u
+#define REMOTE_MAX_FIELDS  32u
+#define REMOTE_FLASH_BYTES 0x8000u
+#define REMOTE_PAGE_LOG2   6u
+#define REMOTE_BLOCK_LOG2  9u
+
+/* What reads and writes mean (LBP EC). */
+enum { REMOTE_WORKING, REMOTE_EEPROM, REMOTE_FLASH };
+
+struct remote_flash {
+    uint8_t bytes[REMOTE_FLASH_BYTES], page[1u << REMOTE_PAGE_LOG2];
+    uint32_t offset;
+};
 
 struct remote {
     const struct remote_kind *kind;
     uint8_t memory[REMOTE_MEMORY];
     uint8_t nv[REMOTE_NV_BYTES];
-    uint8_t nv_memory; /* that reads and writes mean; 0 = none */
+    struct remote_flash flash; /* lives on when the power is off */
+    uint8_t nv_memory;         /* that reads and writes mean */
     uint8_t mode, baud;
+    bool setup;                        /* the jumper */
     uint8_t held;                      /* faults of causes that last */
     uint64_t world[REMOTE_MAX_FIELDS]; /* what is outside of each input field */
     uint32_t shorted, tripped;         /* outputs */
@@ -43,6 +56,10 @@ void remote_put_tables(struct remote *remote);
 uint64_t remote_applied(const struct remote *remote, const struct remote_field *field);
 void remote_sample(struct remote *remote);
 void remote_look_for_shorts(struct remote *remote);
+
+/* remote_flash.c. False: nothing is written. */
+bool remote_flash_write(struct remote_flash *flash, uint16_t address, uint8_t value);
+uint8_t remote_flash_read(const struct remote_flash *flash, uint16_t address);
 
 /* remote.c */
 void remote_add_fault(struct remote *remote, uint8_t fault);

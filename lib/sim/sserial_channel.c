@@ -43,6 +43,9 @@
 #define LBP_WRITE     0x20u
 #define LBP_SIZE      0x03u
 #define LBP_NV_ACCESS 0xECu
+#define LBP_STATUS    0xC1u
+#define LBP_REFUSED   0x20u /* in it: invalid write */
+#define LBP_COOKIE    0xDFu
 
 /* ---- is anybody there? --------------------------------------------------------------------------------------------
  */
@@ -111,7 +114,7 @@ static void reset(struct sserial_channel *const c)
     c->link = SSERIAL_STOPPED;
     c->faults = c->state = c->local = 0;
     c->status = STATUS_STOPPED;
-    c->errors = 0;
+    c->errors = c->lbp_status = 0;
     c->stale = c->starting = false;
     memset(c->user_in, 0, sizeof c->user_in);
 }
@@ -396,7 +399,7 @@ static int64_t lbp_clk(const uint32_t cs)
     const uint32_t command = cs >> LBP_SHIFT;
     if (command == 0)
         return SHORT_CLK;
-    const bool writes = !is_data(command) || (command & LBP_WRITE);
+    const bool writes = command & LBP_WRITE;
     return (writes ? LBP_WRITE_CLK : LBP_READ_CLK) + (is_data(command) ? more[command & LBP_SIZE] : 0);
 }
 
@@ -411,7 +414,8 @@ static void lbp_read(struct sserial_channel *const c, const uint16_t address, co
 static void lbp_write(struct sserial_channel *const c, const uint16_t address, const unsigned size)
 {
     for (unsigned i = 0; i < size; i++)
-        (void)remote_write(c->remote, (uint16_t)(address + i), (uint8_t)(c->user_out[i / 4] >> 8 * (i % 4)));
+        if (!remote_write(c->remote, (uint16_t)(address + i), (uint8_t)(c->user_out[i / 4] >> 8 * (i % 4))))
+            c->lbp_status |= LBP_REFUSED;
 }
 
 /* False: there is no such command. */
@@ -425,6 +429,10 @@ static bool pass_on(struct sserial_channel *const c)
         lbp_write(c, address, lbp_size(command));
     else if (is_data(command))
         lbp_read(c, address, lbp_size(command));
+    else if (command == LBP_STATUS)
+        c->user_in[0] = c->lbp_status;
+    else if (command == LBP_COOKIE)
+        c->user_in[0] = REMOTE_COOKIE;
     else
         return false;
     return true;

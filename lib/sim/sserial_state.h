@@ -45,8 +45,9 @@ struct sserial_channel {
     uint8_t errors;
     bool reached;    /* the message on its way comes to the remote */
     uint8_t pending; /* error of the message on its way: a local fault bit */
-    bool stale;      /* CS is reset when the next command comes */
-    bool starting;   /* by the START that is being carried out */
+    uint8_t lbp_status;
+    bool stale;    /* CS is reset when the next command comes */
+    bool starting; /* by the START that is being carried out */
     /* The host's side */
     uint32_t cs_out, user_out[SSERIAL_USERS];
 };

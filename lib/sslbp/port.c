@@ -10,8 +10,8 @@
 #define LOCAL_LIMIT_NS  (22 * MS)
 #define STOP_LIMIT_NS   (51 * MS)
 #define START_LIMIT_NS  (8000 * MS)
-#define DOIT_LIMIT_NS   (51 * MS)
-#define FASTEST_POLL_NS 50000 /* no card answers faster for long */
+#define DOIT_LIMIT_NS   (1000 * MS) /* a remote erases a block of its flash meanwhile; setsserial waits as long */
+#define FASTEST_POLL_NS 50000       /* no card answers faster for long */
 #define TRIES           3u
 
 /* Local parameters (seed 003, "LOCAL PARAMETERS"; register map 3.8.2). */
@@ -23,9 +23,9 @@ enum { LOCAL_TYPE, LOCAL_WIDTH, LOCAL_MAJOR, LOCAL_MINOR, LOCAL_FIRST, LOCAL_STR
 #define MINOR_BAUD      34u
 
 /* LBP commands of set-up mode (seed 003, "SETUP MODE OPERATION"). */
-#define LBP_READ        0x44u
-#define LBP_WRITE       0x64u
-#define LBP_NONVOLATILE 0xECu
+#define LBP_READ   0x44u
+#define LBP_WRITE  0x64u
+#define LBP_MEMORY 0xECu
 
 static int peek(const struct sslbp_port *const port, const uint16_t address, uint32_t *const value)
 {
@@ -264,12 +264,25 @@ int sslbp_remote_write(const struct sslbp_port *const port, const unsigned chann
     return err < 0 ? remote_failed(port, channel, err, "writing", address) : 0;
 }
 
-int sslbp_nonvolatile(const struct sslbp_port *const port, const unsigned channel, const bool open)
+int sslbp_memory(const struct sslbp_port *const port, const unsigned channel, const uint8_t memory)
 {
-    int err = poke(port, of_channel(port->user[0], channel), open);
+    int err = poke(port, of_channel(port->user[0], channel), memory);
     if (err == 0)
-        err = doit(port, channel, LBP_NONVOLATILE << 24);
-    return err < 0 ? remote_failed(port, channel, err, "switching non-volatile access at", 0) : 0;
+        err = doit(port, channel, LBP_MEMORY << 24);
+    return err < 0 ? remote_failed(port, channel, err, "switching to another memory at", 0) : 0;
+}
+
+int sslbp_remote_local(const struct sslbp_port *const port, const unsigned channel, const uint8_t code,
+                       uint8_t *const value)
+{
+    uint32_t user = 0;
+    int err = HM2_ERR_IO;
+    for (unsigned i = 0; err == HM2_ERR_IO && i < TRIES; i++)
+        err = doit(port, channel, (uint32_t)code << 24);
+    if (err == 0)
+        err = read_user(port, channel, 1, &user);
+    *value = (uint8_t)user;
+    return err < 0 ? remote_failed(port, channel, err, "asking by a local command, at", (uint16_t)(code << 8u)) : 0;
 }
 
 struct remote {

@@ -238,13 +238,20 @@ static const struct {
     {"7I77.BIN", 2000000, 0x5A, 3, "--yes", "expected up to 1048576"},
 };
 
+/* Each image over a serial line, and through a card. */
 START_TEST(firmware_is_updated_and_wrong_images_are_refused)
 {
-    simulate_tty("7i77-field");
-    const char *const path = make_file(images[_i].name, images[_i].len, images[_i].fill);
-    const int status = RUN(images[_i].option, "update", path);
+    const unsigned i = (unsigned)_i / 2;
+    if (_i % 2 == 0)
+        simulate_tty("7i77-field");
+    else
+        simulate_card("1");
+    if (_i % 2)
+        simulator_do(&sim, "remote 0:1 jumper setup");
+    const char *const path = make_file(images[i].name, images[i].len, images[i].fill);
+    const int status = RUN(images[i].option, "update", path);
     remove_file(path);
-    expect(status, images[_i].status, images[_i].says);
+    expect(status, images[i].status, images[i].says);
     simulator_stop(&sim);
 }
 END_TEST
@@ -252,10 +259,14 @@ END_TEST
 /* ---- refusals -----------------------------------------------------------------------------------------------------
  */
 
-START_TEST(firmware_is_not_updated_through_a_card)
+START_TEST(firmware_needs_the_jumper_through_a_card_too)
 {
     simulate_card("1");
-    expect(RUN("--yes", "update", "7I77.BIN"), 3, "with --tty only");
+    expect(RUN("--yes", "update", "7I77.BIN"), 4, "at the 115200 baud of its set-up jumper");
+    simulator_do(&sim, "remote 0:1 jumper setup");
+    expect(RUN("list"), 4, "no remote answers at port 0, channel 1");
+    simulator_do(&sim, "remote 0:1 jumper operate");
+    expect(RUN("list"), 0, "unit number 0x1");
     simulator_stop(&sim);
 }
 END_TEST
@@ -348,8 +359,8 @@ int main(void)
     tcase_add_test(tests, modes_of_a_remote_have_their_own_process_data);
     tcase_add_test(tests, a_permanent_change_needs_a_yes);
     tcase_add_loop_test(tests, firmware_is_updated_and_wrong_images_are_refused, 0,
-                        (int)(sizeof images / sizeof images[0]));
-    tcase_add_test(tests, firmware_is_not_updated_through_a_card);
+                        2 * (int)(sizeof images / sizeof images[0]));
+    tcase_add_test(tests, firmware_needs_the_jumper_through_a_card_too);
     tcase_add_test(tests, who_does_not_answer_is_told_from_what_is_wrong);
     tcase_add_test(tests, a_card_that_is_driven_is_left_alone);
     tcase_add_loop_test(tests, mistakes_are_told, 0, (int)(sizeof mistakes / sizeof mistakes[0]));

@@ -6,6 +6,7 @@
 #include <hm2/lbp_remote.h>
 
 #include "remote_lbp.h"
+#include "remote_state.h"
 
 #define BYTE_NS INT64_C(87000)
 
@@ -256,19 +257,19 @@ static void firmware_is_written_block_by_block_but_for_the_loader(void **state)
     make_image();
     for (unsigned bad = 0; bad <= 9; bad += 9) {
         plug("7i77-field", 0);
-        memset(line.flash.bytes, 0x33, sizeof line.flash.bytes);
+        memset(simulated->flash.bytes, 0x33, sizeof simulated->flash.bytes);
         spoil = bad;
         expect_good(lbp_remote_check_image(&remote, image, sizeof image, &flash));
         assert_int_equal(flash.block_bytes, BLOCK);
         assert_int_equal(flash.page_bytes, 64);
         expect_good(lbp_remote_update(&remote, &flash, image, sizeof image, count_progress, &calls));
-        for (size_t i = 0; i < sizeof line.flash.bytes; i++) {
+        for (size_t i = 0; i < sizeof simulated->flash.bytes; i++) {
             const bool kept = i < BLOCK || i / BLOCK == 2 || i >= 6 * BLOCK;
             const uint8_t wanted = kept ? 0x33 : i < sizeof image ? image[i] : 0;
-            if (line.flash.bytes[i] != wanted)
-                fail_msg("0x%02X at 0x%zX, 0x%02X expected", line.flash.bytes[i], i, wanted);
+            if (simulated->flash.bytes[i] != wanted)
+                fail_msg("0x%02X at 0x%zX, 0x%02X expected", simulated->flash.bytes[i], i, wanted);
         }
-        assert_int_equal(line.memory, LBP_MEMORY_WORKING);
+        assert_int_equal(simulated->nv_memory, REMOTE_WORKING);
         unplug();
     }
     assert_int_equal(calls, 10);
@@ -280,7 +281,7 @@ static void images_that_can_be_no_firmware_are_refused_before_anything_changes(v
     struct lbp_flash flash;
     (void)state;
     plug("7i77-field", 0);
-    memset(line.flash.bytes, 0x33, sizeof line.flash.bytes);
+    memset(simulated->flash.bytes, 0x33, sizeof simulated->flash.bytes);
     large[0] = large[BLOCK - 1] = 1; /* nothing but a loader */
     assert_int_equal(lbp_remote_check_image(&remote, large, 4 * BLOCK, &flash), HM2_ERR_MISMATCH);
     assert_int_equal(lbp_remote_check_image(&remote, large, BLOCK, &flash), HM2_ERR_MISMATCH);
@@ -288,8 +289,8 @@ static void images_that_can_be_no_firmware_are_refused_before_anything_changes(v
     large[BLOCK] = 1;
     expect_good(lbp_remote_check_image(&remote, large, BLOCK + 1, &flash));
     assert_int_equal(lbp_remote_check_image(&remote, large, sizeof large, &flash), HM2_ERR_MISMATCH);
-    for (size_t i = 0; i < sizeof line.flash.bytes; i++)
-        assert_int_equal(line.flash.bytes[i], 0x33);
+    for (size_t i = 0; i < sizeof simulated->flash.bytes; i++)
+        assert_int_equal(simulated->flash.bytes[i], 0x33);
     unplug();
 }
 
@@ -303,7 +304,7 @@ static void a_remote_that_refuses_ends_the_update(void **state)
     expect_good(lbp_remote_check_image(&remote, too_long, sizeof too_long, &flash));
     assert_int_equal(lbp_remote_update(&remote, &flash, too_long, sizeof too_long, NULL, NULL), HM2_ERR_IO);
     assert_non_null(strstr(diag.text, "erasing flash at 0x8000"));
-    assert_int_equal(line.memory, LBP_MEMORY_WORKING);
+    assert_int_equal(simulated->nv_memory, REMOTE_WORKING);
     unplug();
 }
 

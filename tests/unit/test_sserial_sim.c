@@ -5,12 +5,13 @@
 #include <math.h>
 
 #include <hm2/board.h>
+#include <hm2/lbp_remote.h>
 #include <hm2/sim.h>
 #include <hm2/sslbp.h>
 
 #include "idrom_files.h"
 #include "random.h"
-#include "remote_kind.h"
+#include "remote_state.h"
 #include "sserial.h"
 
 #define PERIOD_NS 1000000
@@ -542,6 +543,42 @@ static void after_a_bite_of_the_watchdog_the_port_starts_again(void **state)
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 1);
 }
 
+/* ---- firmware of a remote -----------------------------------------------------------------------------------------
+ */
+
+static void firmware_goes_through_a_card_into_the_flash_of_the_remote(void **state)
+{
+    struct fixture *const f = *state;
+    static const uint8_t modes[SSLBP_CHANNELS];
+    static uint8_t image[5 << REMOTE_BLOCK_LOG2];
+    struct sslbp_port port;
+    struct lbp_flash flash;
+    unsigned failed = 1;
+    struct lbp_port_channel channel = {&port, ANALOG};
+    struct lbp_remote at = {.access = lbp_port_access(&channel), .name = "card", .diag = &f->diag};
+    for (size_t i = 0; i < sizeof image; i++)
+        image[i] = (uint8_t)(i * 7 + i / 256);
+    plug(f);
+    remote_set_jumper(remote(f, ANALOG), true);
+    assert_int_equal(hm2_board_identify(f->board, f->link, &f->diag), 0);
+    assert_int_equal(hm2_board_sserial_open(f->board, 0, &port, &f->diag), 0);
+    assert_int_equal(sslbp_port_baud(&port, LBP_SETUP_BAUD), 0);
+    assert_int_equal(sslbp_port_start(&port, 1u << ANALOG, true, modes, &failed), 0);
+    assert_int_equal(failed, 0);
+    assert_int_equal(lbp_remote_check_image(&at, image, sizeof image, &flash), 0);
+    if (lbp_remote_update(&at, &flash, image, sizeof image, NULL, NULL))
+        fail_msg("%s", f->diag.text);
+    const uint8_t *const bytes = remote(f, ANALOG)->flash.bytes;
+    for (size_t i = 0; i < REMOTE_FLASH_BYTES; i++)
+        assert_int_equal(bytes[i], i >= flash.block_bytes && i < sizeof image ? image[i] : 0xFF);
+    /* The remote refuses what lies behind the end of its flash. */
+    static uint8_t long_image[REMOTE_FLASH_BYTES + 1];
+    long_image[REMOTE_FLASH_BYTES] = 1;
+    assert_int_equal(lbp_remote_update(&at, &flash, long_image, sizeof long_image, NULL, NULL), HM2_ERR_IO);
+    assert_non_null(strstr(f->diag.text, "erasing flash at 0x8000"));
+    hm2_board_sserial_close(f->board, &port);
+}
+
 /* ---- a long run ---------------------------------------------------------------------------------------------------
  */
 
@@ -685,6 +722,7 @@ int main(void)
         TEST(a_port_without_remotes_left_is_in_error_until_run_changes),
         TEST(a_restarted_card_starts_its_remotes_again),
         TEST(after_a_bite_of_the_watchdog_the_port_starts_again),
+        TEST(firmware_goes_through_a_card_into_the_flash_of_the_remote),
         TEST(many_cycles_with_errors_on_both_lines_show_nothing_stale_and_drive_no_glitch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -19,6 +19,7 @@ struct session {
     struct hm2_board *board;
     struct sslbp_port port;
     bool port_open;
+    bool setup_baud; /* through a card: the remote has its set-up jumper in place */
     struct lbp_port_channel channel;
     struct lbp_remote remote;
 };
@@ -55,22 +56,37 @@ static int open_card(struct session *const s)
     return err ? err : hm2_board_undriven(s->board, &s->diag);
 }
 
-/* A set-up START waits for ever on an empty channel (traces): a normal one, which gives up, tells who is there. */
-static int start_channel(struct session *const s)
+static int nobody(struct session *const s)
 {
-    const unsigned mask = 1u << s->options.channel;
-    uint8_t modes[SSLBP_CHANNELS] = {0};
+    return hm2_diag_add(&s->diag, HM2_ERR_TIMEOUT, "%s: no remote answers at port %u, channel %u%s.", s->port.name,
+                        s->options.port, s->options.channel,
+                        s->setup_baud ? ", at the 115200 baud of its set-up jumper" : "");
+}
+
+/* A set-up START waits for ever on an empty channel (traces): a normal one, which gives up, tells who is there. */
+static int look_for_remote(struct session *const s, const uint8_t modes[SSLBP_CHANNELS])
+{
     unsigned failed = 0;
     uint32_t cs = 0;
-    modes[s->options.channel] = (uint8_t)s->options.mode;
-    int err = sslbp_port_start(&s->port, mask, false, modes, &failed);
+    int err = sslbp_port_start(&s->port, 1u << s->options.channel, false, modes, &failed);
     if (!err && failed)
         err = sslbp_port_cs(&s->port, s->options.channel, &cs);
     if (!err && failed && sslbp_status(cs, s->port.minor, false).status & SSLBP_NO_REMOTE)
-        return hm2_diag_add(&s->diag, HM2_ERR_TIMEOUT, "%s: no remote answers at port %u, channel %u.", s->port.name,
-                            s->options.port, s->options.channel);
+        return nobody(s);
+    return err;
+}
+
+/* Nothing is known of a normal START at the jumper's baud rate, for which its time-outs are short. */
+static int start_channel(struct session *const s)
+{
+    uint8_t modes[SSLBP_CHANNELS] = {0};
+    unsigned failed = 0;
+    modes[s->options.channel] = (uint8_t)s->options.mode;
+    int err = s->setup_baud ? 0 : look_for_remote(s, modes);
     if (!err)
-        err = sslbp_port_start(&s->port, mask, true, modes, &failed);
+        err = sslbp_port_start(&s->port, 1u << s->options.channel, true, modes, &failed);
+    if (!err && failed && s->setup_baud)
+        return nobody(s);
     if (!err && failed)
         return hm2_diag_add(&s->diag, HM2_ERR_TIMEOUT,
                             "%s: the remote at port %u, channel %u does not enter set-up mode.", s->port.name,
@@ -84,6 +100,8 @@ static int connect_card(struct session *const s)
     if (!err)
         err = hm2_board_sserial_open(s->board, s->options.port, &s->port, &s->diag);
     s->port_open = !err;
+    if (!err && s->setup_baud)
+        err = sslbp_port_baud(&s->port, LBP_SETUP_BAUD);
     if (!err)
         err = start_channel(s);
     s->channel = (struct lbp_port_channel){&s->port, s->options.channel};
@@ -306,11 +324,7 @@ static int program(struct session *const s, const char *const path, uint8_t *con
 
 static int update(struct session *const s)
 {
-    int err = s->options.tty ? 0
-                             : hm2_diag_add(&s->diag, HM2_ERR_UNSUPPORTED,
-                                            "Firmware is updated with --tty only, and the remote's set-up jumper.");
-    if (!err)
-        err = check_name(s, s->options.words[1]);
+    int err = check_name(s, s->options.words[1]);
     if (err)
         return err;
     uint8_t *const image = malloc(LBP_IMAGE_MAX + 1);
@@ -385,6 +399,7 @@ int main(const int argc, char **const argv)
         return EXIT_USAGE;
     }
     s.remote.diag = &s.diag;
+    s.setup_baud = command->run == update;
     int err = s.options.tty ? connect_tty(&s) : connect_card(&s);
     if (!err && command->tables)
         err = lbp_remote_discover(&s.remote);

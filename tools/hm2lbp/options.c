@@ -20,7 +20,7 @@ static const char usage[] =
     "  list                      every parameter with its value\n"
     "  read NAME [H]             a value, decimal or with H hexadecimal\n"
     "  write NAME VALUE [H]      change it\n"
-    "  update FILE.BIN           new firmware, over a serial port only\n"
+    "  update FILE.BIN           new firmware; the remote needs its set-up jumper\n"
     "NAME may be the beginning of a name; case does not matter.\n"
     "\n"
     "  --tty DEVICE     serial port to a remote in set-up mode\n"

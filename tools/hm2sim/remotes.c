@@ -115,14 +115,21 @@ static bool do_fault(const struct order *const o)
     return true;
 }
 
+static bool do_jumper(const struct order *const o)
+{
+    const bool setup = strcmp(o->arguments[0], "setup") == 0;
+    remote_set_jumper(o->remote, setup);
+    return setup || strcmp(o->arguments[0], "operate") == 0;
+}
+
 static const struct {
     const char *name;
     unsigned arguments;
     bool (*run)(const struct order *order);
 } verbs[] = {
-    {"set", 2, do_set},     {"get", 1, do_get},     {"terminal", 1, do_terminal},       {"pull", 0, do_pull},
-    {"plug", 0, do_plug},   {"error", 2, do_error}, {"power-cycle", 0, do_power_cycle}, {"short", 1, do_short},
-    {"fault", 1, do_fault},
+    {"set", 2, do_set},     {"get", 1, do_get},       {"terminal", 1, do_terminal},       {"pull", 0, do_pull},
+    {"plug", 0, do_plug},   {"error", 2, do_error},   {"power-cycle", 0, do_power_cycle}, {"short", 1, do_short},
+    {"fault", 1, do_fault}, {"jumper", 1, do_jumper},
 };
 
 /* "PORT:CHANNEL" */
@@ -159,5 +166,5 @@ void remotes_command(struct sim_card *const card, const char *const *const words
     }
     snprintf(reply, size,
              "error: remote PORT:CHANNEL set FIELD VALUE, get FIELD, terminal OUTPUT, pull, plug, power-cycle, "
-             "error crc|cookie|overrun|timeout|extra|break COUNT, short OUTPUTS, fault BITS");
+             "error crc|cookie|overrun|timeout|extra|break COUNT, short OUTPUTS, fault BITS, jumper setup|operate");
 }
