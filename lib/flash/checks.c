@@ -112,12 +112,13 @@ static int check_name(const struct flash_board *const board, const struct flash_
                       const struct flash_options *const options, struct hm2_diag *const diag)
 {
     const char *const texts[] = {image->family == FLASH_EFINIX ? last_component(image->project) : "",
-                                 options->file_name ? last_component(options->file_name) : ""};
-    static const char *const kinds[] = {"project", "file name"};
+                                 options->file_name ? last_component(options->file_name) : "",
+                                 options->known_card ? options->known_card : ""};
+    static const char *const kinds[] = {"project", "file name", "entry in the list of known images,"};
     const struct flash_board *other;
     bool named = false;
     int err = 0;
-    for (unsigned i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         const enum naming naming = naming_of(board, texts[i], &other);
         named = named || naming == NAMES_THIS;
         if (naming == NAMES_OTHER)

@@ -84,3 +84,47 @@ int flash_side_file_parse(const char *const text, const size_t len, uint8_t hash
                             "the checksum file goes on after %zu digits without a blank: no SHA-256", digits);
     return 0;
 }
+
+static bool is_blank(const char c)
+{
+    return c == ' ' || c == '\t' || c == '\r';
+}
+
+/* One line: 1 when its hash is the wanted one. */
+static int known_line(const char *line, size_t len, const uint8_t hash[const FLASH_SHA256_BYTES],
+                      char card[const FLASH_TEXT_BYTES], struct hm2_diag *const diag)
+{
+    const size_t digits = (size_t)2 * FLASH_SHA256_BYTES;
+    uint8_t found[FLASH_SHA256_BYTES];
+    while (len > 0 && is_blank(line[len - 1]))
+        len--;
+    if (len == 0 || line[0] == '#')
+        return 0;
+    const int err = flash_side_file_parse(line, len, found, diag);
+    if (err < 0)
+        return err;
+    for (line += digits, len -= digits; len > 0 && is_blank(line[0]); len--)
+        line++;
+    if (len == 0)
+        return hm2_diag_add(diag, HM2_ERR_MALFORMED, "no card stands behind the SHA-256");
+    if (memcmp(found, hash, sizeof found) != 0)
+        return 0;
+    flash_copy_text(card, (const uint8_t *)line, len);
+    return 1;
+}
+
+int flash_known_image(const char *const text, const size_t len, const uint8_t hash[const FLASH_SHA256_BYTES],
+                      char card[const FLASH_TEXT_BYTES], struct hm2_diag *const diag)
+{
+    struct flash_stream stream = {(const uint8_t *)text, len};
+    int result = 0;
+    for (unsigned number = 1; result == 0 && stream.left > 0; number++) {
+        const uint8_t *const end = memchr(stream.data, '\n', stream.left);
+        const size_t bytes = end ? (size_t)(end - stream.data) : stream.left;
+        result = known_line((const char *)stream.data, bytes, hash, card, diag);
+        if (result < 0)
+            (void)hm2_diag_add(diag, result, "that is line %u of the list of known images", number);
+        (void)flash_take(&stream, end ? bytes + 1 : bytes);
+    }
+    return result;
+}

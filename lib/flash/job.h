@@ -5,10 +5,11 @@
  * first sector of a pass, its key, holds what makes the image valid: it is erased first, and its first page is written
  * last.
  *
- * That costs one more erase when the key itself does not change, and nothing cheaper is safe. The check sum of an image
- * stands at its end, and so does any change of the check sum: while the last sector is erased, an FPGA that found the
- * sync word would load frames and never come to a check, and its watchdog waits for the sync word only (flash tool
- * reference 3.8). For Trion no check sum is documented at all. Without the sync word both turn to the fallback image.
+ * That costs one more erase when the key itself does not change, and nothing cheaper is known to be safe. The check sum
+ * of an image stands at its end, and so does any change of the check sum: while the last sector is erased, an FPGA that
+ * found the sync word would load frames and never come to a check, and no source says that its watchdog (flash tool
+ * reference 3.8) still acts then. For Trion no check sum is documented at all. Without the sync word both turn to the
+ * fallback image.
  */
 #ifndef FLASH_JOB_H
 #define FLASH_JOB_H

@@ -46,11 +46,13 @@ static int wait_clear(const struct sslbp_port *const port, const int64_t limit_n
 {
     const int64_t end_ns = port->bus.now_ns(port->bus.access) + limit_ns;
     uint32_t command = 0;
+    /* The last look begins when the time is over: an answer that this host was late to see is not the port's fault. */
     for (int64_t polls = limit_ns / FASTEST_POLL_NS + 1; polls > 0; polls--) {
+        const bool over = port->bus.now_ns(port->bus.access) >= end_ns;
         const int err = peek(port, port->command, &command);
         if (err < 0 || command == 0)
             return err;
-        if (port->bus.now_ns(port->bus.access) >= end_ns)
+        if (over)
             break;
     }
     return HM2_ERR_TIMEOUT;

@@ -340,6 +340,35 @@ START_TEST(prints_daughter_boards_in_capitals)
 }
 END_TEST
 
+static void write_list(const char *const path, const char *const hash, const char *const card)
+{
+    FILE *const file = fopen(path, "w");
+    ck_assert_ptr_nonnull(file);
+    ck_assert_int_ge(fprintf(file, "# images of this house\n%.64s %s\n", hash, card), 0);
+    ck_assert_int_eq(fclose(file), 0);
+}
+
+/* H3: same FPGA, other card; the file does not tell, a list of hashes does. */
+START_TEST(believes_a_list_of_known_images)
+{
+    const char *const address = sim.address[1], *const list = flash_rig_path("known");
+    const char *const image = flash_rig_image("firmware.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 3});
+    run(REFUSED, "--addr", address, "--write", image, "--dry-run");
+    printed("says what card it is for");
+    char hash[65] = "";
+    memcpy(hash, strstr(tool.text, "sha256: '") + 9, 64);
+    write_list(list, hash, "7I92");
+    run(REFUSED, "--addr", address, "--write", image, "--known", list);
+    printed("the image is for a 7I92, going by its entry in the list of known images");
+    write_list(list, hash, "7I93");
+    run(DONE, "--addr", address, "--write", image, "--known", list);
+    write_list(list, "no hash", "7I93");
+    run(REFUSED, "--addr", address, "--write", image, "--known", list);
+    printed("line 2 of the list of known images");
+    run(REFUSED, "--addr", address, "--write", image, "--known", "/nonexistent");
+}
+END_TEST
+
 /* H15: each command that has to do with the flash says which of two chips it is about. */
 START_TEST(reminds_of_the_second_chip)
 {
@@ -430,6 +459,7 @@ int main(void)
     tcase_add_test(tests, tells_the_way_back_from_a_stored_address);
     tcase_add_test(tests, judges_addresses_by_the_cards_mask);
     tcase_add_test(tests, prints_daughter_boards_in_capitals);
+    tcase_add_test(tests, believes_a_list_of_known_images);
     tcase_add_test(tests, reminds_of_the_second_chip);
     tcase_add_test(tests, refuses_a_file_that_its_check_sum_does_not_fit);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);

@@ -76,6 +76,16 @@ static void takes_names_in_any_spelling(void **state)
     }
 }
 
+static void a_list_of_known_images_tells_what_names_do_not(void **state)
+{
+    struct flash_rig *const rig = *state;
+    rig->options.known_card = "7I96S";
+    flash_rig_assert_refused(rig, HM2_ERR_MISMATCH, "for a 7I96S, going by its entry in the list of known images");
+    rig->options.file_name = "firmware.bit";
+    rig->options.known_card = "7I93";
+    flash_rig_must_write(rig);
+}
+
 static void an_override_must_name_the_card(void **state)
 {
     struct flash_rig *const rig = *state;
@@ -343,6 +353,7 @@ int main(void)
         ON_7I93(refuses_wrong_images_for_a_xilinx_card),
         ON_7I96S(refuses_wrong_images_for_an_efinix_card),
         ON_7I93(takes_names_in_any_spelling),
+        ON_7I93(a_list_of_known_images_tells_what_names_do_not),
         ON_7I93(an_override_must_name_the_card),
         ON_7I93(an_image_that_does_not_fit_is_refused),
         ON_7I93(the_fallback_area_needs_a_confirmation),

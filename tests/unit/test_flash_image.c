@@ -94,6 +94,37 @@ static void refuses_each_wrong_byte_of_a_header(void **state)
     assert_int_equal(parse(len, &image, NULL), 0);
 }
 
+/* H16: the lengths in a header are the file's word only. */
+static void refuses_lengths_beyond_the_file_and_cuts_long_texts(void **state)
+{
+    enum { FIRST_TEXT = 13, LONG = 300 };
+    static uint8_t crafted[sizeof file + LONG];
+    struct flash_image image;
+    (void)state;
+    const size_t len = xilinx();
+    for (size_t at = FIRST_TEXT, i = 0; i < 4; i++) {
+        const size_t text = (size_t)file[at + 1] << 8 | file[at + 2];
+        assert_int_equal(file[at], 'a' + i);
+        file[at + 1] = 0xFF;
+        file[at + 2] = 0xFF;
+        assert_int_equal(flash_image_parse(file, at + 3 + text, &image, NULL), HM2_ERR_MALFORMED);
+        assert_int_equal(parse(len, &image, "field"), HM2_ERR_MALFORMED);
+        file[at + 1] = (uint8_t)(text >> 8);
+        file[at + 2] = (uint8_t)text;
+        at += 3 + text;
+    }
+    const size_t text = (size_t)file[FIRST_TEXT + 1] << 8 | file[FIRST_TEXT + 2]; /* now a long one, without an end */
+    memcpy(crafted, file, FIRST_TEXT + 3);
+    crafted[FIRST_TEXT + 1] = LONG >> 8;
+    crafted[FIRST_TEXT + 2] = LONG & 0xFF;
+    memset(crafted + FIRST_TEXT + 3, 0xC3, LONG);
+    memcpy(crafted + FIRST_TEXT + 3 + LONG, file + FIRST_TEXT + 3 + text, len - FIRST_TEXT - 3 - text);
+    assert_int_equal(flash_image_parse(crafted, len - text + LONG, &image, NULL), 0);
+    assert_int_equal(strlen(image.design), FLASH_TEXT_BYTES - 1);
+    assert_int_equal(strspn(image.design, "?"), FLASH_TEXT_BYTES - 1);
+    assert_string_equal(image.part, "6slx9tqg144");
+}
+
 static void refuses_efinix_files_that_cannot_start_from_flash(void **state)
 {
     static const struct {
@@ -162,6 +193,30 @@ static void reads_checksum_files(void **state)
     assert_non_null(strstr(diag.text, "character 10 "));
 }
 
+static void looks_images_up_in_a_list(void **state)
+{
+#define ZEROS "00000000000000000000000000000000000000000000000000000000000000"
+    static const char list[] = "# known images\n\n" ZEROS "01 7I92 \r\n" ZEROS "02  7I93\n" ZEROS "03 7I96S";
+    static const char *const cards[] = {NULL, "7I92", "7I93", "7I96S"};
+    uint8_t hash[FLASH_SHA256_BYTES] = {0};
+    char card[FLASH_TEXT_BYTES];
+    struct hm2_diag diag = {0};
+    (void)state;
+    for (unsigned i = 0; i < 4; i++) {
+        hash[FLASH_SHA256_BYTES - 1] = (uint8_t)i;
+        assert_int_equal(flash_known_image(list, sizeof list - 1, hash, card, &diag), cards[i] ? 1 : 0);
+        if (cards[i])
+            assert_string_equal(card, cards[i]);
+    }
+    static const char *const bad[] = {"\n" ZEROS "01\n", "\nabc 7I92\n", "\n" ZEROS "01x\n"};
+    for (unsigned i = 0; i < 3; i++) {
+        hm2_diag_clear(&diag);
+        assert_int_equal(flash_known_image(bad[i], strlen(bad[i]), hash, card, &diag), HM2_ERR_MALFORMED);
+        assert_non_null(strstr(diag.text, "line 2 "));
+    }
+#undef ZEROS
+}
+
 static void knows_all_cards_exactly(void **state)
 {
     (void)state;
@@ -217,6 +272,8 @@ int main(void)
         cmocka_unit_test(refuses_other_kinds_of_files),
         cmocka_unit_test(fills_the_last_page_as_mesaflash_does),
         cmocka_unit_test(reads_checksum_files),
+        cmocka_unit_test(looks_images_up_in_a_list),
+        cmocka_unit_test(refuses_lengths_beyond_the_file_and_cuts_long_texts),
         cmocka_unit_test(knows_all_cards_exactly),
         cmocka_unit_test(knows_where_the_areas_are),
         cmocka_unit_test(the_boot_block_leads_to_the_user_area),

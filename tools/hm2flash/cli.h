@@ -18,7 +18,7 @@ enum { DONE = 0, FAILED = 1, USAGE = 2, REFUSED = 3, LOST = 4 };
 struct cli {
     /* what was asked for */
     char device[32];
-    const char *address, *override, *expect_mac, *backup_to;
+    const char *address, *override, *expect_mac, *backup_to, *known;
     const char *dbnames[CONNECTORS];
     bool fallback, xml, verbose, json, dry_run, fix_boot_block, no_verify, sha256_check, reload, any_traffic;
     bool confirm_fallback, confirm_outputs;
@@ -73,6 +73,8 @@ void sha256_text(const uint8_t *bytes, size_t len, char text[SHA256_TEXT]);
 /* Compare bytes with PATH.sha256: 0, or an exit status. A file that is not there is an error only when required. */
 int check_side_file(struct cli *cli, const char *path, const uint8_t *bytes, size_t len, bool required,
                     const char *what);
+/* The card that the list of --known says the image is for; empty when it says nothing. 0, or an exit status. */
+int look_up_image(struct cli *cli, const uint8_t *bytes, size_t len, char card[FLASH_TEXT_BYTES]);
 int write_side_files(struct cli *cli, const char *path, const uint8_t *bytes, size_t len);
 
 /* ---- progress

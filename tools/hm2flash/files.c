@@ -11,6 +11,7 @@
 #include "cli.h"
 
 #define SIDE_MOST 65536u
+#define LIST_MOST 1048576u
 
 uint8_t *read_file(const char *const path, const size_t most, size_t *const len)
 {
@@ -78,6 +79,23 @@ int check_side_file(struct cli *const cli, const char *const path, const uint8_t
     say(cli, "%s integrity verification not passed\n", what);
     hash_text(found, text);
     return complain(cli, REFUSED, "%s has the SHA-256 %s, and not the one in %s: load it again", path, text, side);
+}
+
+int look_up_image(struct cli *const cli, const uint8_t *const bytes, const size_t len,
+                  char card[const FLASH_TEXT_BYTES])
+{
+    uint8_t hash[FLASH_SHA256_BYTES];
+    size_t list_len;
+    card[0] = '\0';
+    if (!cli->known)
+        return DONE;
+    uint8_t *const list = read_file(cli->known, LIST_MOST, &list_len);
+    if (!list)
+        return complain(cli, REFUSED, "Can't open the list of known images '%s': %s", cli->known, strerror(errno));
+    digest(bytes, len, hash);
+    const int found = flash_known_image((const char *)list, list_len, hash, card, &cli->diag);
+    free(list);
+    return found < 0 ? report(cli, found) : DONE;
 }
 
 static int write_text(const struct cli *const cli, const char *const path, const char *const text)

@@ -72,6 +72,7 @@ enum option_code {
     OPT_EXPECT_MAC,
     OPT_PAGES,
     OPT_BACKUP_TO,
+    OPT_KNOWN,
     OPT_ANY_TRAFFIC,
     OPT_VERSION,
     OPT_HELP,
@@ -94,6 +95,7 @@ static const struct plain_option {
     {"yes", NULL, OPT_YES, "do not ask whether outputs may let go: they may"},
     {"expect-mac", "MAC", OPT_EXPECT_MAC, "refuse another card than this"},
     {"backup-to", "FOLDER", OPT_BACKUP_TO, "save the flash there before it is written"},
+    {"known", "FILE", OPT_KNOWN, "list of images: SHA-256 and the card each is for"},
     {"pages", "N", OPT_PAGES, "most pages in a datagram, 1 to 5"},
     {"any-traffic", NULL, OPT_ANY_TRAFFIC, "do not look for other programs on the card"},
     {"dbname1", "NAME", OPT_DBNAME + 0, "daughter board at a connector, for --readhmid; also"},
@@ -435,7 +437,10 @@ static int take_option(struct cli *const cli, const int code, const char *const 
     const struct {
         int code;
         const char **text;
-    } texts[] = {{OPT_OVERRIDE, &cli->override}, {OPT_EXPECT_MAC, &cli->expect_mac}, {OPT_BACKUP_TO, &cli->backup_to}};
+    } texts[] = {{OPT_OVERRIDE, &cli->override},
+                 {OPT_EXPECT_MAC, &cli->expect_mac},
+                 {OPT_BACKUP_TO, &cli->backup_to},
+                 {OPT_KNOWN, &cli->known}};
     for (size_t i = 0; i < sizeof flags / sizeof flags[0]; i++)
         if (code == flags[i].code)
             *flags[i].flag = true;

@@ -250,6 +250,7 @@ static int write_image(struct cli *const cli, const char *const path, const uint
 {
     struct flash_image image;
     struct flash_job *job = NULL;
+    char known_card[FLASH_TEXT_BYTES];
     int status = check_side_file(cli, path, bytes, len, cli->sha256_check, "Bitfile");
     if (status == DONE)
         status = parse_image(cli, bytes, len, &image);
@@ -257,8 +258,12 @@ static int write_image(struct cli *const cli, const char *const path, const uint
         status = check_machine(cli, "Reloading");
     if (status != DONE)
         return status;
-    const struct flash_options options = options_of(cli, path);
+    struct flash_options options = options_of(cli, path);
     announce(cli, bytes, len, options.area);
+    status = look_up_image(cli, bytes, len, known_card);
+    if (status != DONE)
+        return status;
+    options.known_card = known_card[0] ? known_card : NULL;
     if (!cli->any_traffic)
         status = report(cli, flash_card_quiet(cli->card, &cli->diag)); /* before the flash is read for the first time */
     if (status != DONE)

@@ -121,6 +121,12 @@ HM2_API uint8_t flash_image_byte(const struct flash_image *image, size_t offset)
 HM2_API int HM2_MUST_CHECK flash_side_file_parse(const char *text, size_t len, uint8_t hash[FLASH_SHA256_BYTES],
                                                  struct hm2_diag *diag);
 
+/* Look an image up in a list of known ones: each line has the SHA-256 of a file as side files have it, blanks, and the
+ * name of the card that the file is for; "#" begins a line of comment. 1: *card is its name; 0: not in the list;
+ * HM2_ERR_MALFORMED with the line's number. */
+HM2_API int HM2_MUST_CHECK flash_known_image(const char *text, size_t len, const uint8_t hash[FLASH_SHA256_BYTES],
+                                             char card[FLASH_TEXT_BYTES], struct hm2_diag *diag);
+
 /* What stands at the beginning of an area. */
 enum flash_content {
     FLASH_BLANK,
@@ -249,6 +255,7 @@ struct flash_progress {
 struct flash_options {
     enum flash_area area;
     const char *file_name;    /* of the image, for the rules about names; NULL = unknown */
+    const char *known_card;   /* that a list of known images says the image is for; NULL = none does */
     const char *override;     /* this card's name: take an image although nothing says that it is for this card, or
                                  something says otherwise (H3, H4). Never helps against another FPGA */
     bool confirmed;           /* the fallback area or the boot block may be written (H4, H6) */
