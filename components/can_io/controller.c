@@ -20,7 +20,10 @@ enum controller_state controller_state(const char *const interface)
 
 int controller_restart(const char *const interface)
 {
-    return can_do_restart(interface);
+    if (can_do_restart(interface) == 0)
+        return 0;
+    /* Some drivers cannot. What is stopped and started begins anew, too; without the right to do so nothing happens. */
+    return can_do_stop(interface) == 0 ? can_do_start(interface) : -1;
 }
 #else
 enum controller_state controller_state(const char *const interface)
