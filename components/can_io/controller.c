@@ -20,10 +20,7 @@ enum controller_state controller_state(const char *const interface)
 
 int controller_restart(const char *const interface)
 {
-    if (can_do_restart(interface) == 0)
-        return 0;
-    /* Some drivers cannot. What is stopped and started begins anew, too; without the right to do so nothing happens. */
-    return can_do_stop(interface) == 0 ? can_do_start(interface) : -1;
+    return can_do_restart(interface);
 }
 #else
 enum controller_state controller_state(const char *const interface)
