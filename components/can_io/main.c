@@ -71,6 +71,7 @@ struct bus {
     const char *interface;
     atomic_bool busy; /* one of its functions runs */
     bool has_controller;
+    bool was_off; /* when its controller was asked last */
 };
 
 static int component_id;
@@ -125,6 +126,16 @@ static int export_function(struct bus *const b, const char *const prefix, const 
 
 /* ---- beside the cycle -------------------------------------------------------------------------------------------- */
 
+static void ask_controller(struct bus *const b)
+{
+    const enum controller_state state = controller_state(b->interface);
+    const bool off = state == CONTROLLER_BUS_OFF;
+    if (off != b->was_off)
+        hm2_can_tell_bus_off(b->can, off);
+    b->was_off = off;
+    *b->points->state = state;
+}
+
 static void restart(const struct bus *const b)
 {
     if (controller_restart(b->interface) == 0)
@@ -137,10 +148,10 @@ static void restart(const struct bus *const b)
 static void supervise(void)
 {
     for (unsigned i = 0; i < bus_count; i++) {
-        const struct bus *const b = &buses[i];
+        struct bus *const b = &buses[i];
         *b->points->link_up = controller_link_up(b->interface);
         if (b->has_controller)
-            *b->points->state = controller_state(b->interface);
+            ask_controller(b);
         if (*b->points->restart || (*b->points->auto_restart && *b->points->state == CONTROLLER_BUS_OFF))
             restart(b);
     }

@@ -2,6 +2,8 @@
 #ifndef HM2_CAN_PRIVATE_H
 #define HM2_CAN_PRIVATE_H
 
+#include <stdatomic.h>
+
 #include <hm2/can.h>
 
 #define NS_PER_MS INT64_C(1000000)
@@ -59,6 +61,8 @@ struct can_bus_points {
     hm2_bit_t *bus_off, *error_passive, *error_warning, *hardware_stamps, *down;
 };
 
+enum can_told { CAN_TOLD_NOTHING, CAN_TOLD_ON_BUS, CAN_TOLD_BUS_OFF };
+
 struct hm2_can {
     const struct hm2_dbc *dbc;
     struct hm2_can_options options;
@@ -69,6 +73,7 @@ struct hm2_can {
     unsigned rx_count;
     struct can_tx *tx; /* in the order of the file */
     unsigned tx_count;
+    atomic_int told; /* enum can_told, of another thread */
     int64_t started_ns;
     bool started;
     struct hm2_can_frame frames[32];

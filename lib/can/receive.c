@@ -96,11 +96,26 @@ static void show_age(const struct hm2_can *const can, const struct can_rx *const
     *rx->points->timed_out = !rx->received || (timeout_ns != 0 && age_ns > timeout_ns);
 }
 
+void hm2_can_tell_bus_off(struct hm2_can *const can, const bool bus_off)
+{
+    atomic_store(&can->told, bus_off ? CAN_TOLD_BUS_OFF : CAN_TOLD_ON_BUS);
+}
+
+static void hear_state(struct hm2_can *const can)
+{
+    const int told = atomic_exchange(&can->told, CAN_TOLD_NOTHING);
+    if (told == CAN_TOLD_BUS_OFF)
+        *can->points->bus_off = true;
+    else if (told == CAN_TOLD_ON_BUS)
+        *can->points->bus_off = *can->points->error_passive = *can->points->error_warning = false;
+}
+
 void hm2_can_read(struct hm2_can *const can, const int64_t now_ns)
 {
     if (!can->started)
         can->started_ns = now_ns;
     can->started = true;
+    hear_state(can);
     take_frames(can, now_ns);
     for (unsigned i = 0; i < can->rx_count; i++) {
         if (can->rx[i].fresh)

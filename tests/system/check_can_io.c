@@ -8,8 +8,8 @@
 
 #include "process.h"
 
-#define LIMIT_S  "240"
-#define LIMIT_MS 280000
+#define LIMIT_S  "500"
+#define LIMIT_MS 560000
 #define SKIPPED  77
 
 static const char *const cases[] = {

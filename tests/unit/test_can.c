@@ -467,6 +467,22 @@ static void error_frames_tell_the_controllers_state(void **state)
     expect("frames-received", 0);
 }
 
+static void the_end_of_bus_off_can_be_told(void **state)
+{
+    (void)state;
+    comes(0x40, "\0\0\0\0\0\0\0\0", 8);
+    bus.in[0].error = true;
+    cycle();
+    expect("bus-off", 1);
+    hm2_can_tell_bus_off(can, false);
+    cycle();
+    expect("bus-off", 0);
+    hm2_can_tell_bus_off(can, true);
+    cycle();
+    cycle();
+    expect("bus-off", 1);
+}
+
 #define WITH_DRIVE(test) cmocka_unit_test_setup_teardown(test, start, stop)
 
 int main(void)
@@ -490,6 +506,7 @@ int main(void)
         WITH_DRIVE(a_full_queue_is_tried_again_with_the_newest_value),
         WITH_DRIVE(an_interface_that_is_down_is_told_and_comes_back),
         WITH_DRIVE(error_frames_tell_the_controllers_state),
+        WITH_DRIVE(the_end_of_bus_off_can_be_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -105,6 +105,10 @@ HM2_API int HM2_MUST_CHECK hm2_can_setup(struct hm2_can *can, struct hm2_can_bus
 HM2_API void hm2_can_read(struct hm2_can *can, int64_t now_ns);
 HM2_API void hm2_can_write(struct hm2_can *can, int64_t now_ns);
 
+/* Somebody who asked the controller itself says whether it is bus-off: the next cycle shows it. Drivers report bus-off
+ * by an error frame, but not all of them its end. May be called from any thread, at any time. */
+HM2_API void hm2_can_tell_bus_off(struct hm2_can *can, bool bus_off);
+
 /* The tables of points; ended by a group without points. */
 HM2_API const struct hm2_point_group *hm2_can_point_groups(void);
 
