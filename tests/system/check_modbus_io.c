@@ -273,13 +273,25 @@ static const char all_types[] =
     "[TRANSACTION_06]\nMB_TX_CODE=fnct_15_write_multiple_coils\nFIRST_ELEMENT=42\nNELEMENTS=2\n"
     "[TRANSACTION_07]\nMB_TX_CODE=fnct_16_write_multiple_registers\nFIRST_ELEMENT=44\nNELEMENTS=2\n";
 
+static const char settings[] = "setp mb2hal.04.00.bit 1\nsetp mb2hal.05.00.float 1234.9\nsetp mb2hal.05.00.int 5\n"
+                               "setp mb2hal.06.01.bit 1\nsetp mb2hal.07.00.float -2\nsetp mb2hal.07.01.int 99\n";
+
+/* All that the settings write has arrived. */
+static void await_writes(void)
+{
+    await_byte(&device->coils[40], 1);
+    await_word(&device->holding[41], 1239);
+    await_byte(&device->coils[43], 1);
+    await_word(&device->holding[44], 0xFFFE);
+    await_word(&device->holding[45], 99);
+}
+
 static void every_type(const char *const link)
 {
     write_file("all.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=8\n", link, all_types);
     start_server();
     load(path("all.ini"));
-    talk_do(&hal, "setp mb2hal.04.00.bit 1\nsetp mb2hal.05.00.float 1234.9\nsetp mb2hal.05.00.int 5\n"
-                  "setp mb2hal.06.01.bit 1\nsetp mb2hal.07.00.float -2\nsetp mb2hal.07.01.int 99\nstart");
+    talk_do(&hal, "%sstart", settings);
     await_pin("mb2hal.00.01.bit", 1, 1);
     await_pin("mb2hal.00.00.bit-inv", 1, 1);
     await_pin("mb2hal.ins.b.bit", 1, 1);
@@ -287,12 +299,8 @@ static void every_type(const char *const link)
     await_pin("mb2hal.02.01.float", 1008, 1008);
     await_pin("mb2hal.02.00.int", 1007, 1007);
     await_pin("mb2hal.03.00.float", 65535, 65535);
-    await_byte(&device->coils[40], 1);
-    await_word(&device->holding[41], 1239);
-    await_byte(&device->coils[43], 1);
+    await_writes();
     ck_assert_uint_eq(device->coils[42], 0);
-    await_word(&device->holding[44], 0xFFFE);
-    await_word(&device->holding[45], 99);
     device->holding[8] = 4321;
     await_pin("mb2hal.02.01.int", 4321, 4321);
     await_pin("mb2hal.02.connected", 1, 1);
@@ -501,6 +509,100 @@ START_TEST(a_wrong_file_is_refused_with_its_line_and_files_are_instances)
 }
 END_TEST
 
+/* ---- peers -------------------------------------------------------------------------------------------------------*/
+
+static void write_text(const char *const name, const char *const text, const mode_t mode)
+{
+    FILE *const file = fopen(path(name), "we");
+    ck_assert_ptr_nonnull(file);
+    fputs(text, file);
+    ck_assert_int_eq(fclose(file), 0);
+    ck_assert_int_eq(chmod(path(name), mode), 0);
+}
+
+/* What mb2hal's pins are when it has read and written all; false when this machine cannot run it. */
+static bool run_mb2hal(struct process *const halrun)
+{
+    char text[1500], file[150];
+    snprintf(
+        text, sizeof text,
+        "#!/bin/sh\nuntil [ -e %s/go ] && [ \"$(halcmd getp mb2hal.02.01.int)\" = 1008 ] &&\n"
+        "    [ \"$(halcmd getp mb2hal.03.00.int)\" = 65535 ] && [ \"$(halcmd getp mb2hal.ins.b.bit)\" = TRUE ] &&\n"
+        "    [ \"$(halcmd getp mb2hal.00.01.bit)\" = TRUE ]; do sleep 0.1; done\n",
+        folder);
+    write_text("wait", text, 0755);
+    snprintf(text, sizeof text, "loadusr -W mb2hal config=%s/all.ini\n%sloadusr -w %s/wait\nshow pin\n", folder,
+             settings, folder);
+    write_text("peer.hal", text, 0644);
+    snprintf(file, sizeof file, "%s/peer.hal", folder);
+    const char *const argv[] = {TEST_SOURCE "/tests/system/halrun-user", file, NULL};
+    process_start(halrun, argv);
+    if (process_wait_end(halrun, 1000) && halrun->status == 77)
+        return false;
+    await_writes();
+    write_text("go", "", 0644);
+    ck_assert(process_wait_end(halrun, LIMIT_MS * 2));
+    return true;
+}
+
+/* Type, direction and value of a pin as "show pin" prints it, or false. Counters of errors have no value here. */
+static bool shown(const char *line, char name[64], char rest[64])
+{
+    char type[16], dir[16], value[32], owner[16];
+    if (sscanf(line, "%15s %15s %15s %31s %63s", owner, type, dir, value, name) != 5 ||
+        strncmp(name, "mb2hal.", 7) != 0)
+        return false;
+    snprintf(rest, 64, "%s %s %s", type, dir, strstr(name, "num_errors") ? "" : value);
+    return true;
+}
+
+static unsigned count_missing(const char *const pins, const char *const among)
+{
+    unsigned missing = 0, seen = 0;
+    char name[64], rest[64], other_name[64], other_rest[64];
+    for (const char *line = pins; line; line = strchr(line, '\n') ? strchr(line, '\n') + 1 : NULL) {
+        if (!shown(line, name, rest))
+            continue;
+        bool found = false;
+        seen++;
+        for (const char *other = among; other; other = strchr(other, '\n') ? strchr(other, '\n') + 1 : NULL)
+            if (shown(other, other_name, other_rest) && strcmp(name, other_name) == 0 && strcmp(rest, other_rest) == 0)
+                found = true;
+        if (!found)
+            printf("%s: %s differs\n", name, rest);
+        missing += !found;
+    }
+    ck_assert_uint_ge(seen, 20);
+    return missing;
+}
+
+START_TEST(debians_mb2hal_has_the_same_pins_and_writes_the_same)
+{
+    static struct process halrun;
+    static struct device after_mb2hal, before;
+    write_file("all.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=8\n", tcp_link(), all_types);
+    memcpy(&before, device, sizeof before);
+    start_server();
+    if (!run_mb2hal(&halrun)) {
+        printf("SKIP: %s", halrun.text);
+        return;
+    }
+    memcpy(&after_mb2hal, device, sizeof after_mb2hal);
+    memcpy(device, &before, sizeof before);
+    load(path("all.ini"));
+    talk_do(&hal, "%sstart", settings);
+    await_writes();
+    await_pin("mb2hal.02.01.int", 1008, 1008);
+    await_pin("mb2hal.03.00.int", 65535, 65535);
+    await_pin("mb2hal.ins.b.bit", 1, 1);
+    await_pin("mb2hal.00.01.bit", 1, 1);
+    ck_assert_uint_eq(count_missing(halrun.text, talk_try(&hal, "show pin")), 0);
+    ck_assert_mem_eq(device->coils, after_mb2hal.coils, sizeof device->coils);
+    ck_assert_mem_eq(device->holding, after_mb2hal.holding, sizeof device->holding);
+    talk_end(&hal);
+}
+END_TEST
+
 int main(void)
 {
     Suite *const suite = suite_create("modbus_io");
@@ -517,6 +619,7 @@ int main(void)
     tcase_add_test(tests, an_exception_is_an_answer_and_counts_for_its_transaction_alone);
     tcase_add_test(tests, a_unit_that_is_not_there_does_not_stop_the_others_on_the_line);
     tcase_add_test(tests, a_wrong_file_is_refused_with_its_line_and_files_are_instances);
+    tcase_add_test(tests, debians_mb2hal_has_the_same_pins_and_writes_the_same);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);
     srunner_run_all(runner, CK_ENV);
