@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * modbus_io against a server of libmodbus, over TCP and over a pseudo-terminal, with its faults, and against LinuxCNC's
- * own mb2hal with the same file.
+ * modbus_io against servers of libmodbus and pymodbus, over TCP and over a pseudo-terminal, with their faults, and
+ * against LinuxCNC's own mb2hal with the same file.
  */
 #include <check.h>
 #include <errno.h>
@@ -147,8 +147,11 @@ static void start_server(void)
 
 static void stop_server(void)
 {
+    if (server <= 0)
+        return;
     kill(server, SIGKILL);
     waitpid(server, NULL, 0);
+    server = 0;
 }
 
 /* ---- the component -----------------------------------------------------------------------------------------------*/
@@ -603,6 +606,45 @@ START_TEST(debians_mb2hal_has_the_same_pins_and_writes_the_same)
 }
 END_TEST
 
+START_TEST(a_server_of_pymodbus_gives_back_what_is_written)
+{
+    static struct process pymodbus;
+    char port[8];
+    snprintf(port, sizeof port, "%d", PORT);
+    const char *const argv[] = {"/usr/bin/python3", TEST_SOURCE "/tests/system/pymodbus-server", address, port, NULL};
+    process_start(&pymodbus, argv);
+    if (!process_wait_line(&pymodbus, "starting", LIMIT_MS, NULL)) {
+        ck_assert_int_eq(pymodbus.status, 77);
+        printf("%s", pymodbus.text);
+        return;
+    }
+    write_file("pymodbus.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=8\n", tcp_link(),
+               "MB_TX_CODE=fnct_05_write_single_coil\nFIRST_ELEMENT=3\nNELEMENTS=1\n"
+               "[TRANSACTION_01]\nMB_TX_CODE=fnct_15_write_multiple_coils\nFIRST_ELEMENT=4\nNELEMENTS=9\n"
+               "[TRANSACTION_02]\nMB_TX_CODE=fnct_01_read_coils\nFIRST_ELEMENT=3\nNELEMENTS=10\n"
+               "[TRANSACTION_03]\nMB_TX_CODE=fnct_02_read_discrete_inputs\nFIRST_ELEMENT=1\nNELEMENTS=2\n"
+               "[TRANSACTION_04]\nMB_TX_CODE=fnct_06_write_single_register\nFIRST_ELEMENT=10\nNELEMENTS=1\n"
+               "[TRANSACTION_05]\nMB_TX_CODE=fnct_16_write_multiple_registers\nFIRST_ELEMENT=11\nPIN_NAMES=x\n"
+               "ELEMENT_TYPES=f32\n"
+               "[TRANSACTION_06]\nMB_TX_CODE=fnct_03_read_holding_registers\nFIRST_ELEMENT=10\nPIN_NAMES=n,x\n"
+               "ELEMENT_TYPES=u16,f32\n"
+               "[TRANSACTION_07]\nMB_TX_CODE=fnct_04_read_input_registers\nFIRST_ELEMENT=99\nNELEMENTS=1\n");
+    load(path("pymodbus.ini"));
+    talk_do(&hal, "setp mb2hal.00.00.bit 1\nsetp mb2hal.01.08.bit 1\nsetp mb2hal.04.00.int 77\n"
+                  "setp mb2hal.05.x.float -2.5\nstart");
+    await_pin("mb2hal.02.00.bit", 1, 1);
+    await_pin("mb2hal.02.09.bit", 1, 1);
+    await_pin("mb2hal.02.01.bit", 0, 0);
+    await_pin("mb2hal.03.01.bit", 1, 1);
+    await_pin("mb2hal.06.n.int", 77, 77);
+    await_pin("mb2hal.06.x.float", -2.5, -2.5);
+    await_pin("mb2hal.07.00.int", 1099, 1099);
+    process_stop(&pymodbus, SIGKILL, LIMIT_MS);
+    await_pin("mb2hal.07.stale", 1, 1);
+    talk_end(&hal);
+}
+END_TEST
+
 int main(void)
 {
     Suite *const suite = suite_create("modbus_io");
@@ -620,6 +662,7 @@ int main(void)
     tcase_add_test(tests, a_unit_that_is_not_there_does_not_stop_the_others_on_the_line);
     tcase_add_test(tests, a_wrong_file_is_refused_with_its_line_and_files_are_instances);
     tcase_add_test(tests, debians_mb2hal_has_the_same_pins_and_writes_the_same);
+    tcase_add_test(tests, a_server_of_pymodbus_gives_back_what_is_written);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);
     srunner_run_all(runner, CK_ENV);
