@@ -72,6 +72,13 @@ LIBS_hm2_lbp16 := $(NFT_LIBS)
 # State and restart of CAN controllers; without it the component carries frames all the same.
 SOCKETCAN_LIBS ?= $(if $(wildcard /usr/include/libsocketcan.h),-lsocketcan)
 LIBS_can_io := $(SOCKETCAN_LIBS)
+# modbus_io is built where libmodbus is.
+MODBUS_LIBS ?= $(shell $(PKG_CONFIG) --libs libmodbus 2>/dev/null)
+LIBS_modbus_io := $(MODBUS_LIBS)
+ifeq ($(strip $(MODBUS_LIBS)),)
+COMPONENTS := $(filter-out modbus_io,$(COMPONENTS))
+SYSTEM_TESTS := $(filter-out check_modbus_io,$(SYSTEM_TESTS))
+endif
 
 obj = $(patsubst %.c,$(BUILDDIR)/obj/%.o,$(1))
 LIB_OBJ := $(call obj,$(LIB_SRC))
@@ -235,8 +242,9 @@ $(BUILDDIR)/unit/%: $(BUILDDIR)/obj/tests/unit/%.o $(call obj,$(UNIT_HELPERS)) $
 
 $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPERS)) $(SIM_A) $(LIB_A)
 	@mkdir -p $(@D)
-	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(LIB_A) $(CHECK_LIBS) -lm \
-		-lpthread
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(LIB_A) $(CHECK_LIBS) $(SYSTEM_LIBS) \
+		-lm -lpthread
+$(BUILDDIR)/system/check_modbus_io: SYSTEM_LIBS := $(MODBUS_LIBS)
 
 # These run drivers in their process, which find HAL, RTAPI and the C library's sockets there.
 $(BUILDDIR)/system/check_dropin_behaviour $(BUILDDIR)/system/check_dropin_loads $(BUILDDIR)/system/check_dropin_ppmc: \

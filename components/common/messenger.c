@@ -29,8 +29,7 @@ static void *messenger_main(void *const unused)
     return NULL;
 }
 
-/* A thread of normal priority, whatever the loader has, with a small stack (hosts lock their memory) and no signals. */
-static int create(void)
+int messenger_create(pthread_t *const thread, void *(*const run)(void *), void *const argument)
 {
     const struct sched_param normal = {.sched_priority = 0};
     pthread_attr_t attributes;
@@ -44,7 +43,7 @@ static int create(void)
     (void)pthread_attr_setstacksize(&attributes, (size_t)STACK_BYTES);
     (void)sigfillset(&all);
     (void)pthread_sigmask(SIG_SETMASK, &all, &before);
-    result = pthread_create(&messenger, &attributes, messenger_main, NULL);
+    result = pthread_create(thread, &attributes, run, argument);
     (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
     (void)pthread_attr_destroy(&attributes);
     return result;
@@ -55,7 +54,7 @@ int messenger_start(const char *const component, void (*const work)(void), const
     job = work;
     job_pause_ns = pause_ns;
     atomic_store(&ends, false);
-    const int result = create();
+    const int result = messenger_create(&messenger, messenger_main, NULL);
     if (result != 0) {
         rtapi_print_msg(RTAPI_MSG_ERR, "%s: no thread beside the cycle: %s\n", component, strerror(result));
         return -result;

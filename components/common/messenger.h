@@ -6,6 +6,8 @@
 #ifndef MESSENGER_H
 #define MESSENGER_H
 
+#include <pthread.h>
+
 #include <hm2/err.h>
 
 #define MESSENGER_PRINTS_NS 100000000L /* often enough for people */
@@ -15,6 +17,10 @@
 int messenger_start(const char *component, void (*work)(void), long pause_ns);
 /* Nothing when it does not run. */
 void messenger_stop(void);
+
+/* A thread of normal priority, whatever the loader has, with a small stack (hosts lock their memory) and no signals.
+ * 0 or an errno. */
+int messenger_create(pthread_t *thread, void *(*run)(void *), void *argument);
 
 #define MESSENGER_LINE 1000
 

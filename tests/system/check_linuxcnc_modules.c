@@ -38,6 +38,7 @@ static const struct component {
 } components[] = {
     {"hm2_7i65", NULL, NULL}, /* needs a card with buffered SPI */
     {"hm2_lbp16", "board_ip=192.168.1.121", "hm2_7i96s.0.read"},
+    {"modbus_io", NULL, NULL},         /* needs a file */
     {"hm2_pty", NULL, NULL},           /* needs a card with serial ports */
     {"ppmc_epp", NULL, "ppmc.0.read"}, /* check_ppmc loads it, with a bus */
     {"recorder", "pins=2 depth=100 file=$(PEER_OUT)/recorded", "recorder.sample"},

@@ -297,6 +297,21 @@ static void words_are_read_in_every_type_and_word_order(void **state)
     assert_int_equal(hm2_modbus_decode_int(&single, false, (const uint16_t[2]){0x7FC0, 0}), 0);
 }
 
+static void the_example_is_a_good_map(void **state)
+{
+    static char text[8192];
+    (void)state;
+    FILE *const file = fopen(TEST_SOURCE "/examples/vfd-delta.ini", "re");
+    assert_non_null(file);
+    const size_t length = fread(text, 1, sizeof text - 1, file);
+    (void)fclose(file);
+    text[length] = '\0';
+    struct hm2_modbus_map *const map = good(text);
+    assert_int_equal(map->transactions[0].first, 0x2100);
+    assert_int_equal(map->transactions[1].first, 0x2000);
+    hm2_modbus_free(map);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -308,6 +323,7 @@ int main(void)
         cmocka_unit_test(keys_without_effect_are_told),
         cmocka_unit_test(bytes_that_are_no_text_are_refused),
         cmocka_unit_test(numbers_convert_in_every_type_and_word_order),
+        cmocka_unit_test(the_example_is_a_good_map),
         cmocka_unit_test(words_are_read_in_every_type_and_word_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
