@@ -299,6 +299,47 @@ static void prepare_cycle(struct hm2_board *const board)
     }
 }
 
+/* A transfer that the write starts is not over when the card has waited, and read too early it is a fault of the port.
+ */
+static bool has_remotes(const struct hm2_board *const board)
+{
+    for (unsigned i = 0; i < board->module_count; i++) {
+        const struct hm2_module *const module = &board->modules[i];
+        const uint8_t gtag = module->type->gtag;
+        if ((gtag == HM2_GTAG_SSERIAL || gtag == HM2_GTAG_SSERIALB) && module->context)
+            return true;
+    }
+    return false;
+}
+
+static void warn_plain(const struct hm2_board *const board, const char *const reason, struct hm2_diag *const diag)
+{
+    hm2_diag_warn(diag, "%s: config pipelined=%u has no effect: %s", board->prefix, board->config.pipelined, reason);
+}
+
+static int lay_out(struct hm2_board *const board, struct hm2_diag *const diag)
+{
+    const unsigned timer = board->config.pipelined;
+    if (timer == 0)
+        return hm2_plan_freeze(board->plan, diag);
+    if (has_remotes(board)) {
+        warn_plain(board,
+                   "smart-serial remotes need more time than the card waits (sserial_port_0=xxxxxxxx leaves them "
+                   "alone)",
+                   diag);
+        return hm2_plan_freeze(board->plan, diag);
+    }
+    int err = hm2_plan_pipeline(board->plan, timer, diag);
+    if (err == 0)
+        err = hm2_plan_freeze(board->plan, diag);
+    if (err == 0 && !hm2_plan_pipelines(board->plan))
+        warn_plain(board,
+                   "what a cycle writes and what it asks for do not fit into one datagram; use fewer module "
+                   "instances",
+                   diag);
+    return err;
+}
+
 static int create_objects(struct hm2_board *const board, struct hm2_binder *const binder, struct hm2_diag *const diag)
 {
     struct hm2_setup setup = {
@@ -322,17 +363,12 @@ static int create_objects(struct hm2_board *const board, struct hm2_binder *cons
     if (err == 0)
         err = setup_modules(board, &setup);
     if (err == 0)
-        err = hm2_plan_freeze(board->plan, diag);
-    if (err == 0 && board->config.pipelined > 0 && !hm2_plan_pipelines(board->plan))
-        hm2_diag_warn(diag,
-                      "%s: config pipelined=%u has no effect: what a cycle writes and what it asks for do not fit into "
-                      "one datagram. Use fewer module instances",
-                      board->prefix, board->config.pipelined);
+        err = lay_out(board, diag);
     prepare_cycle(board);
     return err;
 }
 
-static int prepare_pipeline(struct hm2_board *const board, struct hm2_diag *const diag)
+static int check_pipeline(struct hm2_board *const board, struct hm2_diag *const diag)
 {
     const unsigned timer = board->config.pipelined;
     if (timer == 0)
@@ -342,7 +378,7 @@ static int prepare_pipeline(struct hm2_board *const board, struct hm2_diag *cons
             diag, HM2_ERR_INVALID, "%s: config pipelined=%u found, but no DPLL is %s; the card has nothing to wait for",
             board->prefix, timer, board->config.count[HM2_CFG_DPLLS] == 0 ? "used (num_dplls=0)" : "in the firmware");
     board->pipeline.timer = timer;
-    return hm2_plan_pipeline(board->plan, timer, diag);
+    return 0;
 }
 
 /* The identity request of a card that comes back is prepared here: the cycle only changes its number. */
@@ -366,7 +402,7 @@ int hm2_board_setup(struct hm2_board *const board, const unsigned index, struct 
         return err;
     hm2_plan_init(board->plan, board->nonce);
     const int checks[] = {check_counts(board, diag), check_serial(board, diag), match_modules(board, diag),
-                          prepare_identity(board), prepare_pipeline(board, diag)};
+                          prepare_identity(board), check_pipeline(board, diag)};
     for (size_t i = 0; i < sizeof checks / sizeof checks[0]; i++)
         if (checks[i] < 0)
             return checks[i];

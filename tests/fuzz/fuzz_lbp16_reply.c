@@ -37,10 +37,12 @@ static void set_up(struct client *const client)
     require(hm2_plan_add_write(plan, &client->writes[0], HM2_RANK_NORMAL, 0x2000, 127, NULL) == 0);
     require(hm2_plan_add_write(plan, &client->writes[1], HM2_RANK_NORMAL, 0x21FC, 80, NULL) == 0);
     for (unsigned i = 0; i < SECTIONS; i++)
-        require(hm2_plan_add_setup(plan, &client->sections[i], (enum hm2_rank)(4u - i % 5u),
+        require(hm2_plan_add_setup(plan, &client->sections[i], (enum hm2_rank)(HM2_RANK_LAST - i % 5u),
                                    (uint16_t)(0x4000 + i * 512), 20 * i + 1,
                                    i & (HM2_SECTION_FIFO | HM2_SECTION_ON_DEMAND), NULL) == 0);
+    require(hm2_plan_pipeline(plan, 1, NULL) == 0);
     require(hm2_plan_freeze(plan, NULL) == 0);
+    require(hm2_plan_pipelines(plan));
 }
 
 /* A datagram of ours must be one that a card parses whole. */
@@ -66,11 +68,15 @@ static void receive(struct client *const client, const uint8_t *const bytes, con
     uint8_t *const buffer = hm2_plan_reply_buffer(client->plan);
     memcpy(buffer, bytes, len);
     const uint32_t number = hm2_get_le32(buffer + good - 14);
+    const uint32_t turn_number = hm2_get_le32(buffer + good + 6 - 14);
     const enum hm2_reply verdict = hm2_plan_judge(client->plan, claimed);
     const bool fresh = claimed == good && client->outstanding && number == client->last_request;
-    require((verdict == HM2_REPLY_FRESH) == fresh);
-    require(claimed == good || verdict == HM2_REPLY_MALFORMED);
-    if (fresh) {
+    /* The reply to a turn has six bytes more, here in front of everything. */
+    const bool turn = claimed == good + 6;
+    const bool fresh_turn = turn && client->outstanding && turn_number == client->last_request;
+    require((verdict == HM2_REPLY_FRESH) == (fresh || fresh_turn));
+    require(claimed == good || turn || verdict == HM2_REPLY_MALFORMED);
+    if (fresh || fresh_turn) {
         client->outstanding = false;
         client->shown = hm2_get_le32(buffer); /* FIRST: the register at 0x3000 leads the reply */
     }
@@ -85,7 +91,7 @@ static size_t step(struct client *const client, const uint8_t *const data, const
     const size_t good = hm2_plan_reply_bytes(plan);
     const size_t rest = size - 1;
     size_t len;
-    switch (data[0] % 9u) {
+    switch (data[0] % 10u) {
     case 0:
         check_datagram(hm2_plan_request(plan, &len), len);
         client->last_request++;
@@ -110,6 +116,11 @@ static size_t step(struct client *const client, const uint8_t *const data, const
         return 1;
     case 6:
         hm2_section_set(section, section->words - 1u, hm2_section_get(section, 0) + 1u);
+        return 1;
+    case 9:
+        check_datagram(hm2_plan_turn(plan, 150, &len), len);
+        client->last_request++;
+        client->outstanding = true;
         return 1;
     case 7: /* a datagram of the right length */
         len = rest < good ? rest : good;

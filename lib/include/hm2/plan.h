@@ -167,8 +167,8 @@ HM2_API void hm2_plan_touch_all(struct hm2_plan *plan);
 /* Request for this cycle (next sequence number). The pointer stays valid until the next call. A request that is still
  * outstanding is given up. */
 HM2_API const uint8_t *hm2_plan_request(struct hm2_plan *plan, size_t *len);
-/* The request that is outstanding, to be sent once more: whichever reply comes first is FRESH, the other STALE. NULL when
- * the plan reads what goes away by being read, or may: queues, and registers that are chosen in the cycle. */
+/* The request that is outstanding, to be sent once more: whichever reply comes first is FRESH, the other STALE. NULL
+ * when the plan reads what goes away by being read, or may: queues, and registers that are chosen in the cycle. */
 HM2_API const uint8_t *hm2_plan_request_again(const struct hm2_plan *plan, size_t *len);
 /* Buffer to receive into: hm2_plan_reply_capacity() bytes, larger than a good reply so that a long one is noticed. */
 HM2_API uint8_t *hm2_plan_reply_buffer(struct hm2_plan *plan);
