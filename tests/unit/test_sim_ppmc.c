@@ -4,6 +4,7 @@
 #include "unit.h"
 
 #include <inttypes.h>
+#include <math.h>
 
 #include <hm2/sim_ppmc.h>
 
@@ -365,6 +366,138 @@ static void steady_motion_counts_as_single_edges_do(void **state)
     }
 }
 
+static int64_t swing(void *const context, const int64_t now_ns)
+{
+    const int64_t *const way = context;
+    return (int64_t)((double)*way * sin((double)now_ns * 1e-6)); /* of 6.3 ms */
+}
+
+static void a_shaft_that_follows_something_is_counted_where_that_is(void **state)
+{
+    (void)state;
+    int64_t way = 500; /* at most 500000 edges a second */
+    struct sim_ppmc *const bus = board_of(0x14, NULL);
+    sim_ppmc_follow(bus, SLOT, 1, swing, &way);
+    for (unsigned i = 0; i < 2000; i++) {
+        wait_us(bus, 50);
+        const int64_t at = swing(&way, sim_ppmc_now_ns(bus));
+        const struct sim_ppmc_truth truth = sim_ppmc_truth(bus, SLOT, 1);
+        assert_int_equal(truth.shaft, at);
+        assert_in_range(truth.counted - at + 10, 9, 11); /* the last edge waits in the filter */
+    }
+    assert_int_equal(sim_ppmc_truth(bus, SLOT, 1).illegal, 0);
+    sim_ppmc_set_rate(bus, SLOT, 1, 0); /* it is let go */
+    way = 0;
+    wait_us(bus, 50);
+    assert_true(sim_ppmc_truth(bus, SLOT, 1).shaft != 0);
+    assert_int_equal(sim_ppmc_truth(bus, SLOT, 1).counted, sim_ppmc_truth(bus, SLOT, 1).shaft);
+    sim_ppmc_free(bus);
+}
+
+static void a_broken_wire_counts_to_and_fro(void **state)
+{
+    (void)state;
+    struct sim_ppmc *const bus = board_of(0x14, NULL);
+    sim_ppmc_break_wire(bus, SLOT, 0, true);
+    sim_ppmc_set_rate(bus, SLOT, 0, 100000);
+    wait_us(bus, 10000);
+    assert_in_range(sim_ppmc_truth(bus, SLOT, 0).shaft, 999, 1001);
+    assert_in_range(sim_ppmc_truth(bus, SLOT, 0).counted + 1, 0, 2);
+    sim_ppmc_break_wire(bus, SLOT, 0, false);
+    wait_us(bus, 10000);
+    assert_in_range(sim_ppmc_truth(bus, SLOT, 0).counted, 998, 1002);
+    sim_ppmc_free(bus);
+}
+
+/* ppmc.md section 11.3, rules 5, 17 and 18: what no document tells, each way. */
+static void an_unanswered_read_leaves_what_the_options_say(void **state)
+{
+    (void)state;
+    static const unsigned wanted[] = {[SIM_PPMC_RESIDUE] = 0x60, [SIM_PPMC_ONES] = 0xFF, [SIM_PPMC_ZEROS] = 0x00};
+    for (unsigned how = SIM_PPMC_RESIDUE; how <= SIM_PPMC_ZEROS; how++) {
+        const struct sim_ppmc_options options = {.unanswered = (enum sim_ppmc_unanswered)how};
+        struct sim_ppmc *const bus = board_of(0x14, &options);
+        uint8_t byte = 0x55;
+        assert_true(address(bus, 0x60));
+        assert_false(sim_ppmc_cycle(bus, EPP_DATA_READ, &byte));
+        assert_int_equal(byte, wanted[how]);
+        sim_ppmc_free(bus);
+    }
+}
+
+static void behind_the_last_register_the_address_goes_round_or_runs_on(void **state)
+{
+    (void)state;
+    for (unsigned runs_on = 0; runs_on < 2; runs_on++) {
+        const struct sim_ppmc_options options = {.runs_on = runs_on != 0};
+        struct sim_ppmc *const bus = board_of(0x14, &options);
+        uint8_t byte = 0;
+        assert_true(address(bus, BASE + 31));
+        (void)get(bus);
+        assert_true(sim_ppmc_cycle(bus, EPP_DATA_READ, &byte) != (runs_on != 0)); /* nobody is behind it */
+        assert_int_equal(sim_ppmc_stats(bus).undocumented, 1);
+        sim_ppmc_free(bus);
+    }
+}
+
+static void the_high_byte_of_a_timestamp_is_held_when_the_low_one_is_read_or_not(void **state)
+{
+    (void)state;
+    for (unsigned tears = 0; tears < 2; tears++) {
+        const struct sim_ppmc_options options = {.timestamps_live = true, .timestamps_tear = tears != 0};
+        struct sim_ppmc *const bus = board_of(0x14, &options);
+        sim_ppmc_set_time(bus, 253000); /* two cycles later it is 0x00FF, and 0x0100 with the next */
+        assert_int_equal(get_at(bus, 24), 0xFF);
+        assert_int_equal(get(bus), tears);
+        sim_ppmc_free(bus);
+    }
+}
+
+/* ppmc.md sections 3.3 and 11.3, rules 6 and 13: the lines of a port's control register, and its mode. */
+static void a_port_reaches_the_boards_only_with_all_strobes_released_in_epp_mode(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        uint8_t control, ecr;
+        bool answers, resets;
+    } rows[] = {{"all released", 0x04, 0x80, true, false},    {"direction commanded", 0x24, 0x80, true, false},
+                {"nStrobe held", 0x05, 0x80, false, false},   {"nAutoFd held", 0x06, 0x80, false, false},
+                {"nSelectIn held", 0x0C, 0x80, false, false}, {"SPP mode", 0x04, 0x00, false, false},
+                {"byte mode", 0x04, 0x20, false, false},      {"nInit low", 0x00, 0x80, false, true}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct sim_ppmc *const bus = board_of(0x14, NULL);
+        put_at(bus, 13, 0x0F);
+        sim_ppmc_port_out(bus, 0x402, rows[i].ecr);
+        sim_ppmc_port_out(bus, 2, rows[i].control);
+        sim_ppmc_port_out(bus, 3, BASE + 15);
+        const uint8_t byte = sim_ppmc_port_in(bus, 4);
+        const bool timeout = sim_ppmc_port_in(bus, 1) & 1u;
+        if (timeout == rows[i].answers || (rows[i].answers && byte != 0x14) ||
+            (sim_ppmc_registers(bus, SLOT).preset == 0) != rows[i].resets)
+            fail_msg("%s: read 0x%02X, time-out %d", rows[i].name, byte, timeout);
+        sim_ppmc_free(bus);
+    }
+}
+
+/* ppmc.md section 5: set-up opens the load path first, and then writes the bytes. */
+static void a_counter_follows_the_assembly_register_while_its_load_bit_is_on(void **state)
+{
+    (void)state;
+    struct sim_ppmc *const bus = board_of(0x14, NULL);
+    sim_ppmc_set_counter(bus, SLOT, 3, 0x777777);
+    put_at(bus, 3, 0x80);
+    put_at(bus, 0, 0x0A);
+    put_at(bus, 1, 0x0B);
+    put_at(bus, 2, 0x0C);
+    wait_us(bus, 2);
+    put_at(bus, 3, 0);
+    put_at(bus, 0, 0xFF);
+    wait_us(bus, 2);
+    assert_int_equal(sim_ppmc_truth(bus, SLOT, 3).counter, 0x0C0B0A);
+    sim_ppmc_free(bus);
+}
+
 /* seed 004, "DIP switch paragraphs", and the vector of ppmc.md section 11.8. */
 static void a_board_answers_at_its_two_slots_and_nowhere_else(void **state)
 {
@@ -531,6 +664,13 @@ int main(void)
         cmocka_unit_test(each_filter_rate_counts_up_to_its_limit_and_nothing_beyond),
         cmocka_unit_test(a_glitch_shorter_than_the_filter_is_no_count),
         cmocka_unit_test(steady_motion_counts_as_single_edges_do),
+        cmocka_unit_test(a_shaft_that_follows_something_is_counted_where_that_is),
+        cmocka_unit_test(a_broken_wire_counts_to_and_fro),
+        cmocka_unit_test(an_unanswered_read_leaves_what_the_options_say),
+        cmocka_unit_test(behind_the_last_register_the_address_goes_round_or_runs_on),
+        cmocka_unit_test(the_high_byte_of_a_timestamp_is_held_when_the_low_one_is_read_or_not),
+        cmocka_unit_test(a_counter_follows_the_assembly_register_while_its_load_bit_is_on),
+        cmocka_unit_test(a_port_reaches_the_boards_only_with_all_strobes_released_in_epp_mode),
         cmocka_unit_test(a_board_answers_at_its_two_slots_and_nowhere_else),
         cmocka_unit_test(the_address_switches_choose_the_range),
         cmocka_unit_test(the_address_counts_on_after_every_data_byte),

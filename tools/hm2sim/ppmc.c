@@ -29,7 +29,8 @@ static int add_axis(struct ppmc_bus *const ppmc, const unsigned axis)
     return err;
 }
 
-int ppmc_open(struct ppmc_bus *const ppmc, struct sim_card *const card, const char *const path, struct hm2_diag *const diag)
+int ppmc_open(struct ppmc_bus *const ppmc, struct sim_card *const card, const char *const path,
+              struct hm2_diag *const diag)
 {
     int64_t position;
     int err = 0;
