@@ -22,7 +22,7 @@
 #define PEER_LIMIT_MS 60000
 #define CANNOT_RUN    77
 #define MORE_TRIES    3
-#define GIVEN_UP      "hm2_eth: rtapi_app_main: Resource temporarily unavailable"
+#define GIVEN_UP      "hm2_eth: rtapi_app_main: "
 
 #define MAX_OBJECTS 2048u
 
@@ -129,7 +129,7 @@ static bool load(const struct load *const load, const char *const driver)
                                 load->value,
                                 NULL};
     int status = process_run(&run, argv, PEER_LIMIT_MS);
-    /* LinuxCNC's driver gives a reply 200 ms and then gives up, which a busy machine takes now and then. */
+    /* LinuxCNC's driver waits for replies in real time and then gives up, as it does now and then on a busy machine. */
     for (unsigned again = 0; status == 1 && again < MORE_TRIES && strstr(run.text, GIVEN_UP); again++)
         status = process_run(&run, argv, PEER_LIMIT_MS);
     if (status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
