@@ -47,8 +47,9 @@ void sim_tram_write(struct sim_tram *const tram, const uint16_t address, const u
 static uint8_t read_table(const struct sim_tram *const tram, const uint16_t address, uint8_t *const undriven)
 {
     const unsigned lane = address % 4;
+    const uint32_t word = tram->word[(address - TABLE) / 4]; /* 16 bits: the upper two bytes are driven by nothing */
     *undriven = lane < 2 ? 0 : 0xFF;
-    return lane < 2 ? (uint8_t)(tram->word[(address - TABLE) / 4] >> lane * BYTE_BITS) : 0;
+    return (uint8_t)(word >> lane * BYTE_BITS);
 }
 
 uint8_t sim_tram_read(struct sim_tram *const tram, const uint16_t address, uint8_t *const undriven)
