@@ -83,6 +83,15 @@ static int setup_port(struct hm2_bspi *const port, const struct hm2_module *cons
                                     setup->diag);
 }
 
+/* Outputs count from 0x81, the selects from 0x85: 0x84 would be the input. */
+static const char *output_name(const struct hm2_pd *const pd)
+{
+    static const char *const names[] = {"nframe", "out", "clk", NULL,  "cs0", "cs1",
+                                        "cs2",    "cs3", "cs4", "cs5", "cs6", "cs7"};
+    const unsigned number = pd->secondary_pin - (HM2_PIN_OUTPUT | 1u);
+    return number < sizeof names / sizeof names[0] ? names[number] : NULL;
+}
+
 static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 {
     if (module->instances == 0)
@@ -94,7 +103,7 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
     ctx->port = hm2_setup_alloc(setup, module->instances * sizeof *ctx->port);
     if (!ctx->port)
         return HM2_ERR_NOMEM;
-    int err = hm2_claim_pins(module, setup, HM2_GTAG_NONE, module->instances, false, NULL);
+    int err = hm2_claim_pins(module, setup, HM2_GTAG_NONE, module->instances, true, NULL);
     for (unsigned unit = 0; err == 0 && unit < module->instances; unit++)
         err = setup_port(&ctx->port[unit], module, setup, unit);
     return err;
@@ -288,5 +297,6 @@ const struct hm2_module_type hm2_bspi_type = {
     .unpack = unpack,
     .pack = pack,
     .write_lost = write_lost,
+    .output_name = output_name,
     .groups = groups,
 };

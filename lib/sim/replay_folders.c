@@ -498,6 +498,7 @@ const struct replay_kind replay_kinds[] = {
      .registers = wavegen_registers,
      .signals = wavegen_signals},
     {.folder = "idrom", .extra = replay_idrom, .no_events = true},
+    {.folder = "tram", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_tram, .no_events = true},
     {.folder = "lbp16", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_lbp16, .no_events = true},
 };
 

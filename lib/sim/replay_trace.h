@@ -158,6 +158,8 @@ enum sim_level replay_level(char c, bool *valid);
 
 int replay_idrom(const struct replay_kind *kind, const struct replay_files *files, const struct replay_options *options,
                  struct replay_totals *totals, struct hm2_diag *diag);
+int replay_tram(const struct replay_kind *kind, const struct replay_files *files, const struct replay_options *options,
+                struct replay_totals *totals, struct hm2_diag *diag);
 int replay_lbp16(const struct replay_kind *kind, const struct replay_files *files, const struct replay_options *options,
                  struct replay_totals *totals, struct hm2_diag *diag);
 int replay_pwm_measure(const struct replay_kind *kind, const struct replay_files *files,

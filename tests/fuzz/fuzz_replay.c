@@ -60,9 +60,9 @@ static bool list(void *const context, const size_t index, char *const name, cons
 
 int LLVMFuzzerTestOneInput(const uint8_t *const data, const size_t size)
 {
-    static const char *const kinds[] = {"encoder", "encoder_muxed", "pwmgen", "stepgen", "watchdog",
-                                        "ioport",  "hm2dpll",       "idrom",  "lbp16",   "bspi",
-                                        "dbspi",   "spi",           "uart",   "pktuart", "pktuart_new"};
+    static const char *const kinds[] = {"encoder", "encoder_muxed", "pwmgen",      "stepgen", "watchdog", "ioport",
+                                        "hm2dpll", "idrom",         "lbp16",       "bspi",    "dbspi",    "spi",
+                                        "uart",    "pktuart",       "pktuart_new", "tram"};
     if (size < 1)
         return 0;
     struct input input = {.data = data + 1, .size = size - 1};

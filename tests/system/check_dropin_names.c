@@ -68,6 +68,12 @@ static const struct load loads[] = {
     {"7i93", "no-dpll", "num_dplls=0 enable_raw", {NULL}},
     {"7i93", "encoders-only", "num_pwmgens=0 num_stepgens=0 num_leds=0", {NULL}},
     {"7i93", "wide-stepgens", "stepgen_width=6 firmware=ignored.bit", {NULL}},
+    {"7i93_svst4_8", "default", "", {NULL}},
+    {"7i93_svst8_8im2", "default", "", {NULL}},
+    {"7i93_svst1_4_7i47s", "default", "", {NULL}},
+    {"7i93_2x7i65", "default", "", {NULL}},
+    {"7i93_sv12im_2x7i48", "default", "", {NULL}},
+    {"7i93_sv6_7i49", "default", "", {NULL}},
     {"7i93",
      "absolute",
      "ssi_chan_0=a%12ub%3fc%1b%2pd%12s ssi_chan_1=pos%25ge biss_chan_1=turns%12hturns%18l fanuc_chan_0=AA64",
@@ -243,12 +249,18 @@ static void compare_text(const char *const what, const struct object *const obje
 /* Values that depend on the moment at which they are looked at. */
 static bool rests(const char *const name)
 {
-    static const char *const restless[] = {
-        "gpio.041.in*",   /* of a 7I77: the select line of its encoders */
-        "7i??.0.?.fault", /* a remote's watchdog bites, or not yet, while it is asked */
+    static const struct {
+        const char *where, *name;
+    } restless[] = {
+        /* the select lines of multiplexed encoders */
+        {"names/7i96s_7i77d/*", "gpio.041.in*"},
+        {"names/7i93_2x7i65/*", "gpio.0[13][37].in*"},
+        {"names/7i93_sv12im_2x7i48/*", "gpio.0[13][04].in*"},
+        /* a remote's watchdog bites, or not yet, while it is asked */
+        {"names/7i96s_7i77d/*", "7i??.0.?.fault"},
     };
     for (size_t i = 0; i < sizeof restless / sizeof restless[0]; i++)
-        if (fnmatch(restless[i], name, 0) == 0)
+        if (fnmatch(restless[i].where, where, 0) == 0 && fnmatch(restless[i].name, name, 0) == 0)
             return false;
     return true;
 }

@@ -54,6 +54,25 @@ static void a_port_that_the_configuration_leaves_out_is_not_there(void **state)
     assert_null(hm2_bspi_port(bench->board, 1));
 }
 
+/* LinuxCNC's driver makes them outputs while it loads, not with the first cycle: a daughter card never sees them float.
+ */
+static void outputs_have_names_and_are_driven_from_the_start(void **state)
+{
+    static const struct {
+        unsigned io;
+        const char *name;
+    } rows[] = {{14, "nframe"}, {15, "out"}, {16, "clk"}, {18, "cs2"}, {19, "cs1"}, {20, "cs0"}};
+    const struct sim_bench *const bench = bench_of(state);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char name[64];
+        int err;
+        (void)snprintf(name, sizeof name, "hm2_7i80.0.bspi.00.%s.invert_output", rows[i].name);
+        (void)hm2_plain_get(bench->plain, name, &err);
+        assert_int_equal(err, 0);
+        assert_true(sim_card_pad(bench->card, rows[i].io) != SIM_FLOAT);
+    }
+}
+
 static void impossible_settings_are_refused_with_a_reason(void **state)
 {
     struct sim_bench *const bench = bench_of(state);
@@ -164,6 +183,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_teardown(a_port_that_the_configuration_leaves_out_is_not_there, tear_down),
+        cmocka_unit_test_teardown(outputs_have_names_and_are_driven_from_the_start, tear_down),
         cmocka_unit_test_teardown(impossible_settings_are_refused_with_a_reason, tear_down),
         cmocka_unit_test_teardown(frames_come_back_in_order_and_on_their_own_channel, tear_down),
         cmocka_unit_test_teardown(lost_packets_never_shift_the_words, tear_down),

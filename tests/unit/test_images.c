@@ -218,11 +218,55 @@ static void every_card_loads_and_its_pins_have_names(void **state)
     }
 }
 
+/* The configurations of the 7I93's manual: the last instance of each module is there and reads. */
+static void the_configurations_of_the_7i93_have_their_modules(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *profile, *points[4];
+        unsigned io; /* a pin of its daughter card, and what it does */
+        const char *pin;
+    } rows[] = {
+        {"7i93", {"encoder.07.count", "pwmgen.07.value", "stepgen.03.counts"}, 6, "PWMGen #1, pin Out0 (PWM or Up)"},
+        {"7i93_svst4_8", {"encoder.03.count", "pwmgen.03.value", "stepgen.07.counts"}, 24, "StepGen #0, pin Step"},
+        {"7i93_svst8_8im2", {"encoder.07.count", "pwmgen.07.value", "stepgen.07.counts"}, 4, "Encoder #1, pin Index"},
+        {"7i93_svst1_4_7i47s", {"encoder.03.count", "pwmgen.00.value", "stepgen.03.counts"}, 0, "StepGen #0, pin Step"},
+        {"7i93_2x7i65", {"encoder.15.count"}, 15, "Buffered SPI Interface #0, pin Serial Out"},
+        {"7i93_sv12im_2x7i48",
+         {"encoder.11.count", "pwmgen.11.value"},
+         10,
+         "Muxed Encoder Select #0, pin Mux Select 0"},
+        {"7i93_sv6_7i49",
+         {"resolver.05.count", "resolver.excitation-khz", "pwmgen.05.value"},
+         10,
+         "Resolver #0, pin REFPDM+"},
+    };
+    static struct bench b;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char text[8192], wanted[96];
+        const struct sim_card_options options = {.profile = rows[i].profile};
+        if (load(&b, &options) != 0)
+            fail_msg("%s: %s", rows[i].profile, b.diag.text);
+        assert_string_equal(b.diag.text, "");
+        run(&b, 3);
+        assert_true(point(&b, "packet-error-total") == 0);
+        for (const char *const *name = rows[i].points; *name; name++)
+            (void)point(&b, *name);
+        (void)snprintf(wanted, sizeof wanted, "IO Pin %03u (%s-%02u): %s", rows[i].io, rows[i].io < 24 ? "P2" : "P1",
+                       hm2_connector_pin(24, rows[i].io), rows[i].pin);
+        (void)hm2_board_describe_pins(b.board, text, sizeof text);
+        if (!strstr(text, wanted))
+            fail_msg("%s: no \"%s\" in:\n%s", rows[i].profile, wanted, text);
+        release(&b);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_image_that_was_dumped_loads_and_runs),
         cmocka_unit_test(every_card_loads_and_its_pins_have_names),
+        cmocka_unit_test(the_configurations_of_the_7i93_have_their_modules),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -445,6 +445,42 @@ static void a_wrong_reply_is_found(void **state)
     }
 }
 
+static void bytes_of_the_epp_bus_are_compared_and_checked(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *row, *difference;
+        unsigned failed;
+    } rows[] = {
+        {"a,0,R,0100,FE CA AA 55", "", 0},
+        {"a,0,R,7800,00 00 XX XX", "", 0},
+        {"a,0,R,0100,FE CA AB 55", "access 0, address 0102: expected AB, got AA", 1},
+        {"a,0,R,7800,00 00 00 XX", "access 0, address 7802: expected 00, got XX", 1},
+    };
+    static const char *const broken[] = {"a,0,R,0100,FE CA A", "a,0,R,0100,FECA", "a,0,W,0100,XX", "a,0,R,10000,00",
+                                         "a,0,Q,0100,00"};
+    char events[200];
+    const struct memory_file files[] = {{"events.csv", events}, {NULL, NULL}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        snprintf(events, sizeof events, "test,seq,ev,addr,bytes\n%s\n", rows[i].row);
+        struct memory_folder folder = {.files = files};
+        const struct replay_totals totals = replay_memory("tram", &folder);
+        assert_int_equal(totals.failed, rows[i].failed);
+        assert_int_equal(totals.passed, 1 - rows[i].failed);
+        assert_string_equal(folder.first_difference, rows[i].difference);
+    }
+    for (size_t i = 0; i < sizeof broken / sizeof broken[0]; i++) {
+        snprintf(events, sizeof events, "test,seq,ev,addr,bytes\n%s\n", broken[i]);
+        struct memory_folder folder = {.files = files};
+        const struct replay_files from = {.load = load_memory, .list = list_memory, .context = &folder};
+        const struct replay_options options = {0};
+        struct replay_totals totals = {0};
+        struct hm2_diag diag = {0};
+        assert_int_equal(replay_folder("tram", &from, &options, &totals, &diag), HM2_ERR_MALFORMED);
+        assert_non_null(strstr(diag.text, "events.csv line 2: expected "));
+    }
+}
+
 static void a_dump_and_its_index_must_agree(void **state)
 {
     (void)state;
@@ -594,6 +630,9 @@ static void the_recorded_session_and_dumps_are_matched(void **state)
     struct replay_totals totals = replay_data("lbp16");
     assert_int_equal(totals.failed, 0);
     assert_int_equal(totals.passed, 102);
+    totals = replay_data("tram");
+    assert_int_equal(totals.failed, 0);
+    assert_int_equal(totals.passed, 8);
     totals = replay_data("idrom");
     assert_int_equal(totals.failed, 0);
     assert_int_equal(totals.passed, 218);
@@ -619,6 +658,7 @@ int main(void)
         cmocka_unit_test(a_test_without_events_fails),
         cmocka_unit_test(a_wrong_measurement_is_found),
         cmocka_unit_test(a_wrong_reply_is_found),
+        cmocka_unit_test(bytes_of_the_epp_bus_are_compared_and_checked),
         cmocka_unit_test(a_dump_and_its_index_must_agree),
         cmocka_unit_test(inputs_that_were_not_recorded_follow_from_the_reads),
         cmocka_unit_test(the_recorded_session_and_dumps_are_matched),
