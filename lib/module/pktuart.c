@@ -63,7 +63,7 @@ static int open_port(struct hm2_serial *const port, struct hm2_diag *const diag)
     if (!err)
         err = pkt_rx_add(&p->rx, port, diag);
     if (!err)
-        err = hm2_plan_add_queue_read(port->plan, &p->tx_state, p->port.tx_reg[SERIAL_MODE], 1, diag);
+        err = hm2_plan_add_queue_read(port->plan, &p->tx_state, p->port.tx_reg[SERIAL_MODE], 2, diag);
     const struct {
         struct hm2_section *section;
         uint16_t address;
@@ -173,12 +173,20 @@ static void queue_frame(struct pktuart *const p)
     p->queued_words += sent_words(p);
 }
 
+/* For a clock at its beginning a frame is neither queued nor under way: so the mode is read twice, or the buffer would
+ * be taken to have room that it has not. */
+static unsigned frames_in(const uint32_t mode)
+{
+    return MODE_FRAMES(mode) + ((mode & MODE_ACTIVE) != 0);
+}
+
 static void take_sent(struct pktuart *const p)
 {
-    p->tx_mode_seen = hm2_window_get(&p->tx_state, 0);
+    const unsigned before = frames_in(hm2_window_get(&p->tx_state, 0));
+    p->tx_mode_seen = hm2_window_get(&p->tx_state, 1);
     if (!p->port.resend)
         queue_frame(p);
-    const unsigned there = MODE_FRAMES(p->tx_mode_seen) + ((p->tx_mode_seen & MODE_ACTIVE) != 0);
+    const unsigned now = frames_in(p->tx_mode_seen), there = before > now ? before : now;
     while (p->queued > there) {
         p->queued_words -= p->queue_words[0];
         memmove(p->queue_words, p->queue_words + 1, --p->queued);
