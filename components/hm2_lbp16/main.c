@@ -8,6 +8,7 @@
  * hm2_eth together, so that a HAL file needs no change but this line.
  */
 #include <errno.h>
+#include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -187,8 +188,12 @@ static void close_functions(void)
 /* ---- for the functions that other components call -----------------------------------------------------------------
  */
 
+/* One change at a time: hm2_pty follows its terminals in a thread of its own, while others are loaded. */
+static pthread_mutex_t changes = PTHREAD_MUTEX_INITIALIZER;
+
 void card_pause(struct card *const card)
 {
+    (void)pthread_mutex_lock(&changes);
     atomic_store(&card->held, true);
     await_functions(card);
 }
@@ -196,6 +201,7 @@ void card_pause(struct card *const card)
 void card_resume(struct card *const card)
 {
     atomic_store(&card->held, false);
+    (void)pthread_mutex_unlock(&changes);
 }
 
 struct hm2_board *card_board(struct card *const card)

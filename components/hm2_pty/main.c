@@ -9,6 +9,7 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <termios.h>
@@ -23,6 +24,7 @@
 
 #include "common/hal_binder.h"
 #include "common/messenger.h"
+#include "speed.h"
 
 MODULE_AUTHOR("libhm2 developers");
 MODULE_DESCRIPTION("serial ports of Mesa cards as terminals");
@@ -53,12 +55,19 @@ RTAPI_MP_ARRAY_INT(tx_gap, MAX_PORTS, "PktUART: bits between frames that are sen
 static int rx_gap[MAX_PORTS];
 RTAPI_MP_ARRAY_INT(rx_gap, MAX_PORTS, "PktUART: bits after which a received frame ends (20)");
 
+static int follow[MAX_PORTS];
+RTAPI_MP_ARRAY_INT(follow, MAX_PORTS, "1 = take the speed that a program sets on the terminal");
+
 /* Of the component that drives the card. */
 int hm2_serial_use(const char *name, const struct hm2_serial_settings *settings, struct hm2_serial **port);
 
 struct terminal {
-    hm2_u32_t *rx_bytes, *tx_bytes, *rx_errors, *rx_overruns, *rx_uncertain, *tx_uncertain;
+    hm2_u32_t *rx_bytes, *tx_bytes, *rx_errors, *rx_overruns, *rx_uncertain, *tx_uncertain, *baud;
+    const char *name;
     struct hm2_serial *port;
+    struct hm2_serial_settings settings;
+    uint32_t speed; /* of the terminal, as seen last */
+    bool follows;
     int master, slave;
     uint8_t pending[CHUNK]; /* from the card, for the terminal */
     size_t pending_len;
@@ -76,6 +85,7 @@ static const struct hm2_point points[] = {
               "bytes that may have been lost with a reply, at most"),
     HM2_POINT(struct terminal, tx_uncertain, "tx-uncertain", HM2_U32, HM2_PIN_OUT, 0, "",
               "bytes that may not have been sent, for the same reason"),
+    HM2_POINT(struct terminal, baud, "baud", HM2_U32, HM2_PIN_OUT, 0, "bits/s", "speed of the port"),
 };
 
 static int component_id;
@@ -85,6 +95,22 @@ static unsigned count;
 
 /* ---- the thread
  * ------------------------------------------------------------------------------------------------------ */
+
+/* The port takes the terminal's new speed when it has sent what was written before. False while it has not. A speed
+ * that it cannot have is refused once, with a message. */
+static bool follow_speed(struct terminal *const t)
+{
+    const uint32_t speed = t->follows ? terminal_speed(t->slave) : 0;
+    if (speed == 0 || speed == t->speed)
+        return true;
+    if (hm2_serial_waiting(t->port) > 0)
+        return false;
+    struct hm2_serial_settings settings = t->settings;
+    t->speed = settings.baud = speed;
+    if (hm2_serial_use(t->name, &settings, &t->port) == 0)
+        t->settings = settings;
+    return true;
+}
 
 static void to_card(struct terminal *const t)
 {
@@ -121,12 +147,14 @@ static void show_counts(const struct terminal *const t)
     *t->rx_overruns = counts.rx_overruns;
     *t->rx_uncertain = counts.rx_uncertain;
     *t->tx_uncertain = counts.tx_uncertain;
+    *t->baud = t->settings.baud;
 }
 
 static void carry(void)
 {
     for (unsigned i = 0; i < count; i++) {
-        to_card(terminals[i]);
+        if (follow_speed(terminals[i]))
+            to_card(terminals[i]);
         to_terminal(terminals[i]);
         show_counts(terminals[i]);
     }
@@ -155,6 +183,7 @@ static int read_settings(const unsigned i, struct hm2_serial_settings *const set
                                              .parity = (enum hm2_parity)parity_word,
                                              .drive = (enum hm2_serial_drive)drive_word,
                                              .mask = mask[i] != 0,
+                                             .speed_varies = follow[i] != 0,
                                              .drive_delay_clk = (unsigned)delay[i],
                                              .tx_gap_bits = tx_gap[i] ? (unsigned)tx_gap[i] : 40u,
                                              .rx_gap_bits = rx_gap[i] ? (unsigned)rx_gap[i] : 20u};
@@ -173,8 +202,9 @@ static int open_terminal(struct terminal *const t, const unsigned i)
     if (t->slave < 0 || tcgetattr(t->slave, &raw))
         return -errno;
     cfmakeraw(&raw);
-    if (tcsetattr(t->slave, TCSANOW, &raw))
+    if (tcsetattr(t->slave, TCSANOW, &raw) || terminal_set_speed(t->slave, t->settings.baud))
         return -errno;
+    t->speed = terminal_speed(t->slave);
     if (links[i] && links[i][0]) {
         rtapi_snprintf(t->link, sizeof t->link, "%s", links[i]);
         char target[128];
@@ -192,12 +222,13 @@ static int open_terminal(struct terminal *const t, const unsigned i)
 static int load_terminal(const unsigned i)
 {
     char prefix[HAL_NAME_LEN + 1];
-    struct hm2_serial_settings settings;
     struct hm2_diag diag;
     struct terminal *const t = terminals[i] = hal.binder.alloc(&hal.binder, sizeof *t);
     if (!t)
         return -ENOMEM;
     t->master = t->slave = -1;
+    t->name = ports[i];
+    t->follows = follow[i] != 0;
     count = i + 1;
     hm2_diag_clear(&diag);
     rtapi_snprintf(prefix, sizeof prefix, "hm2-pty.%u", i);
@@ -205,9 +236,9 @@ static int load_terminal(const unsigned i)
         rtapi_print_msg(RTAPI_MSG_ERR, "hm2_pty: %s\n", diag.text);
         return -EINVAL;
     }
-    int result = read_settings(i, &settings);
+    int result = read_settings(i, &t->settings);
     if (!result)
-        result = hm2_serial_use(ports[i], &settings, &t->port);
+        result = hm2_serial_use(ports[i], &t->settings, &t->port);
     if (result)
         return result;
     result = open_terminal(t, i);

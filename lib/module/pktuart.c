@@ -11,27 +11,28 @@
 #include "module_types.h"
 #include "pktuart_rx.h"
 
-#define CLEAR          0x80010000u
-#define BLOCKS         6u
-#define WORDS          63u
-#define FRAMES         16u
-#define BUFFER_WORDS   255u /* with one more bit 21 reads as if there were none */
-#define QUEUED_FRAMES  12u
-#define MODE_FRAMES(m) ((m) >> 16 & 0x1Fu)
-#define MODE_ACTIVE    (1u << 7)
-#define TX_DRIVE       (1u << 6)
-#define TX_AUTO        (1u << 5)
-#define RX_ENABLE      (1u << 3)
-#define RX_MASK        (1u << 2)
-#define PARITY         (1u << 17)
-#define PARITY_ODD     (1u << 18)
-#define GAP_SHIFT      8
-#define FILTER_SHIFT   22
-#define FILTER_MAX     0xFFu
-#define MIN_GAP        11u /* below it each byte becomes a frame */
-#define NARROW_BITS    20u
-#define WIDE_BITS      24u
-#define WIDE_PROBE     0x00A00000u
+#define CLEAR           0x80010000u
+#define BLOCKS          6u
+#define WORDS           63u
+#define FRAMES          16u
+#define BUFFER_WORDS    255u /* with one more bit 21 reads as if there were none */
+#define QUEUED_FRAMES   12u
+#define MODE_FRAMES(m)  ((m) >> 16 & 0x1Fu)
+#define MODE_ACTIVE     (1u << 7)
+#define TX_DRIVE        (1u << 6)
+#define TX_AUTO         (1u << 5)
+#define RX_ENABLE       (1u << 3)
+#define RX_MASK         (1u << 2)
+#define PARITY          (1u << 17)
+#define PARITY_ODD      (1u << 18)
+#define GAP_SHIFT       8
+#define FILTER_SHIFT    22
+#define FILTER_MASK     0xFFu
+#define RESET_FILTER_HZ 5e6
+#define MIN_GAP         11u /* below it each byte becomes a frame */
+#define NARROW_BITS     20u
+#define WIDE_BITS       24u
+#define WIDE_PROBE      0x00A00000u
 
 struct pktuart {
     struct hm2_serial port; /* first: a port is found through it */
@@ -62,7 +63,7 @@ static int open_port(struct hm2_serial *const port, struct hm2_diag *const diag)
     if (!err)
         err = pkt_rx_add(&p->rx, port, diag);
     if (!err)
-        err = hm2_plan_add_queue_read(port->plan, &p->tx_state, p->port.tx_reg[SERIAL_MODE], 1, diag);
+        err = hm2_plan_add_queue_read(port->plan, &p->tx_state, p->port.tx_reg[SERIAL_MODE], 2, diag);
     const struct {
         struct hm2_section *section;
         uint16_t address;
@@ -97,24 +98,24 @@ static int refuse(const struct pktuart *const p, const struct hm2_serial_setting
     return 0;
 }
 
+/* Half a bit, as LinuxCNC's driver has it, and never 0, which makes the receiver see a low for ever. The filter counts
+ * up to this while the line is high and must count down to see a start bit, from wherever it was before: after a change
+ * to a shorter filter the first bytes would be spoilt. So speeds that vary have the filter of the firmware's reset. */
+static uint32_t filter_clk(const struct pktuart *const p, const struct hm2_serial_settings *const s)
+{
+    const double most = p->rate_bits == WIDE_BITS ? 65535.0 : 255.0;
+    double clocks = p->port.clock_hz / (2.0 * s->baud);
+    if (s->speed_varies && clocks > p->port.clock_hz / RESET_FILTER_HZ)
+        clocks = p->port.clock_hz / RESET_FILTER_HZ;
+    return clocks < 1.0 ? 1u : clocks > most ? (uint32_t)most : (uint32_t)clocks;
+}
+
 static void set_rates(struct pktuart *const p, const struct hm2_serial_settings *const s)
 {
     const uint32_t rate = serial_rate(&p->port, s->baud, p->rate_bits);
-    /* The filter is half a bit, as LinuxCNC's driver has it, and never 0, which makes the receiver see a low for ever.
-     */
-    const double filter = p->port.clock_hz / (2.0 * s->baud);
-    const uint32_t wide = filter > 65535.0 ? 65535u : (uint32_t)filter;
+    const uint32_t high = p->rate_bits == WIDE_BITS ? filter_clk(p, s) >> 8 << 24 : 0;
     hm2_section_set(&p->tx_rate, 0, rate);
-    hm2_section_set(&p->rx_rate, 0, p->rate_bits == WIDE_BITS ? rate | wide >> 8 << 24 : rate);
-}
-
-static uint32_t filter_of(const struct pktuart *const p, const uint32_t baud)
-{
-    const double clocks = p->port.clock_hz / (2.0 * baud);
-    const uint32_t filter = clocks > 65535.0 ? 65535u : (uint32_t)clocks;
-    if (p->rate_bits == WIDE_BITS)
-        return filter & FILTER_MAX;
-    return filter > FILTER_MAX ? FILTER_MAX : filter ? filter : 1u;
+    hm2_section_set(&p->rx_rate, 0, rate | high);
 }
 
 static int set_port(struct hm2_serial *const port, const struct hm2_serial_settings *const s,
@@ -134,7 +135,7 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
     hm2_section_set(&p->rx_mode, 0, CLEAR);
     hm2_section_set(&p->rx_mode, 1,
                     parity | RX_ENABLE | (s->mask ? RX_MASK : 0) | s->rx_gap_bits << GAP_SHIFT |
-                        filter_of(p, s->baud) << FILTER_SHIFT);
+                        (filter_clk(p, s) & FILTER_MASK) << FILTER_SHIFT);
     hm2_section_touch(&p->tx_mode);
     hm2_section_touch(&p->rx_mode);
     p->queued = p->queued_words = 0;
@@ -172,12 +173,20 @@ static void queue_frame(struct pktuart *const p)
     p->queued_words += sent_words(p);
 }
 
+/* For a clock at its beginning a frame is neither queued nor under way: so the mode is read twice, or the buffer would
+ * be taken to have room that it has not. */
+static unsigned frames_in(const uint32_t mode)
+{
+    return MODE_FRAMES(mode) + ((mode & MODE_ACTIVE) != 0);
+}
+
 static void take_sent(struct pktuart *const p)
 {
-    p->tx_mode_seen = hm2_window_get(&p->tx_state, 0);
+    const unsigned before = frames_in(hm2_window_get(&p->tx_state, 0));
+    p->tx_mode_seen = hm2_window_get(&p->tx_state, 1);
     if (!p->port.resend)
         queue_frame(p);
-    const unsigned there = MODE_FRAMES(p->tx_mode_seen) + ((p->tx_mode_seen & MODE_ACTIVE) != 0);
+    const unsigned now = frames_in(p->tx_mode_seen), there = before > now ? before : now;
     while (p->queued > there) {
         p->queued_words -= p->queue_words[0];
         memmove(p->queue_words, p->queue_words + 1, --p->queued);

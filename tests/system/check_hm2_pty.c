@@ -118,6 +118,22 @@ static struct trip round_trip(const int fd, const size_t bytes)
     return trip;
 }
 
+/* A machine that holds the thread up for long loses bytes, which the card's buffers cannot keep. Returns what is
+ * counted.
+ */
+static double tell(const struct line *const line, const struct trip *const trip)
+{
+    static const char *const losses[] = {"rx-errors", "rx-overruns", "rx-uncertain", "tx-uncertain"};
+    double lost = 0;
+    printf("%s: %zu of %zu bytes came back, %zu not in their place", line->name, trip->got, trip->bytes, trip->wrong);
+    for (size_t i = 0; i < sizeof losses / sizeof losses[0]; i++) {
+        lost += count(losses[i]);
+        printf(", %s %.0f", losses[i], count(losses[i]));
+    }
+    printf(", replies lost %.0f\n", talk_value(&hal, "hm2_7i80.0.packet-lost"));
+    return lost;
+}
+
 START_TEST(what_is_written_to_the_terminal_comes_back_or_is_counted)
 {
     const struct line *const line = &lines[_i];
@@ -125,15 +141,7 @@ START_TEST(what_is_written_to_the_terminal_comes_back_or_is_counted)
     const int fd = open_terminal();
     const struct trip trip = round_trip(fd, bytes_of(line));
     ck_assert_uint_eq(trip.written, trip.bytes);
-    /* A machine that holds the thread up for long loses bytes, which the card's buffers cannot keep. */
-    static const char *const losses[] = {"rx-errors", "rx-overruns", "rx-uncertain", "tx-uncertain"};
-    double lost = 0;
-    printf("%s: %zu of %zu bytes came back, %zu not in their place", line->name, trip.got, trip.bytes, trip.wrong);
-    for (size_t i = 0; i < sizeof losses / sizeof losses[0]; i++) {
-        lost += count(losses[i]);
-        printf(", %s %.0f", losses[i], count(losses[i]));
-    }
-    printf(", replies lost %.0f\n", talk_value(&hal, "hm2_7i80.0.packet-lost"));
+    const double lost = tell(line, &trip);
     if (lost == 0) {
         ck_assert_uint_eq(trip.got, trip.bytes);
         ck_assert_uint_eq(trip.wrong, 0);
@@ -143,6 +151,49 @@ START_TEST(what_is_written_to_the_terminal_comes_back_or_is_counted)
     close(fd);
     talk_end(&hal);
     ck_assert_int_ne(access(terminal, F_OK), 0);
+    simulator_stop(&sim);
+}
+END_TEST
+
+static void set_speed(const int fd, const speed_t speed)
+{
+    struct termios settings;
+    ck_assert_int_eq(tcgetattr(fd, &settings), 0);
+    ck_assert_int_eq(cfsetspeed(&settings, speed), 0);
+    ck_assert_int_eq(tcsetattr(fd, TCSANOW, &settings), 0);
+}
+
+/* Register map 3.13: rate = baud * 2^20 / clock. */
+static uint32_t rate_register(void)
+{
+    return simulator_read(&sim, 0, 0x6200) & 0xFFFFFu;
+}
+
+static uint32_t rate_of(const double baud)
+{
+    return (uint32_t)(baud * 1048576.0 / 1e8 + 0.5);
+}
+
+START_TEST(the_port_follows_the_speed_that_a_program_sets)
+{
+    static const struct line line = {"following", "hm2_pty/PKTUART_1", "pktuart.0", "baud=9600 drive=on follow=1", 0};
+    start(&line);
+    const int fd = open_terminal();
+    struct termios settings;
+    ck_assert_int_eq(tcgetattr(fd, &settings), 0);
+    ck_assert_uint_eq(cfgetospeed(&settings), B9600);
+    ck_assert_uint_eq(rate_register(), rate_of(9600));
+    set_speed(fd, B1000000);
+    talk_wait(&hal, "hm2-pty.0.baud", 1000000, 1000000);
+    talk_do(&hal, "run 0.1");
+    ck_assert_uint_eq(rate_register(), rate_of(1000000));
+    const struct trip trip = round_trip(fd, 100);
+    const double lost = tell(&line, &trip);
+    ck_assert_uint_gt(trip.got, 0);
+    if (lost == 0)
+        ck_assert_uint_eq(trip.got, 100);
+    close(fd);
+    talk_end(&hal);
     simulator_stop(&sim);
 }
 END_TEST
@@ -163,8 +214,14 @@ int main(void)
 {
     Suite *const suite = suite_create("hm2_pty");
     TCase *const tests = tcase_create("terminals");
-    tcase_set_timeout(tests, getenv("HM2_PTY_BYTES") ? LONG_LIMIT_S : 60);
-    tcase_add_loop_test(tests, what_is_written_to_the_terminal_comes_back_or_is_counted, 0, LINES);
+    for (int i = 0; i < LINES; i++) { /* CK_RUN_CASE picks one */
+        TCase *const one = tcase_create(lines[i].name);
+        tcase_set_timeout(one, getenv("HM2_PTY_BYTES") ? LONG_LIMIT_S : 60);
+        tcase_add_loop_test(one, what_is_written_to_the_terminal_comes_back_or_is_counted, i, i + 1);
+        suite_add_tcase(suite, one);
+    }
+    tcase_set_timeout(tests, 60);
+    tcase_add_test(tests, the_port_follows_the_speed_that_a_program_sets);
     tcase_add_test(tests, a_port_that_is_not_there_is_refused);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);

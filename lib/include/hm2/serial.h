@@ -27,6 +27,7 @@ struct hm2_serial_settings {
     enum hm2_parity parity;            /* PktUART with version 1 or later only */
     enum hm2_serial_drive drive;       /* AUTO: the transmitter is enabled while it sends */
     bool mask;                         /* the receiver ignores what the own transmitter sends */
+    bool speed_varies;                 /* PktUART: an input filter that is right for every speed, at most 200 ns */
     unsigned drive_delay_clk;          /* 0..15, from enable to the start bit; PktUART version 0 with AUTO: at most 1 */
     unsigned tx_gap_bits, rx_gap_bits; /* PktUART, 11..255: between frames. The receiver's counts on during a byte */
 };

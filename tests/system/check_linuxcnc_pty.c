@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* hm2_pty under LinuxCNC: a serial program sets its speed and gets back what it writes (tests/system/hal/echo-pty). */
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "process.h"
+
+#define LIMIT_MS   130000
+#define CANNOT_RUN 77
+
+static struct process run;
+
+START_TEST(a_terminal_of_the_card_echoes)
+{
+    static const char out[] = TEST_BUILD "/linuxcnc-pty";
+    const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer",
+                                TEST_BUILD,
+                                out,
+                                "7i80hd-16",
+                                TEST_SOURCE "/tests/system/hal/pty.hal",
+                                "--firmware",
+                                TEST_DATA "/hm2_pty/PKTUART_0.hex",
+                                "--uart",
+                                "pktuart.0:loop",
+                                NULL};
+    const char *line;
+    if (TEST_SANITIZED) {
+        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+        return;
+    }
+    (void)mkdir(out, 0755);
+    ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
+    process_run(&run, argv, LIMIT_MS);
+    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &line)) {
+        printf("%.*s\n", (int)strcspn(line, "\n"), line);
+        return;
+    }
+    if (run.status != 0 || !process_wait_line(&run, "ok echo: ", 0, &line)) {
+        printf("%s\n", run.text);
+        fflush(stdout);
+        ck_abort_msg("no echo, status %d", run.status);
+    }
+    printf("%.*s\n", (int)strcspn(line, "\n"), line);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *const suite = suite_create("hm2_pty in LinuxCNC");
+    TCase *const tests = tcase_create("LinuxCNC");
+    tcase_set_timeout(tests, 140);
+    tcase_add_test(tests, a_terminal_of_the_card_echoes);
+    suite_add_tcase(suite, tests);
+    SRunner *const runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    const int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed > 0;
+}
