@@ -3,6 +3,8 @@
  * Who is at the smart-serial ports (flash tool reference 3.18). The pins are given to the ports for as long as it
  * takes, everything else is left as it is.
  */
+#include <hm2/lbp.h>
+
 #include "card.h"
 
 enum { PORT_DDR = 1, PORT_ALTERNATE = 2 };
@@ -65,12 +67,12 @@ static int read_value(const struct sslbp_port *const port, struct flash_remote *
     if (field->bits == 0 || field->bits > WIDEST)
         return 0;
     if (guarded)
-        err = sslbp_nonvolatile(port, remote->channel, true);
+        err = sslbp_memory(port, remote->channel, LBP_MEMORY_EEPROM);
     if (err == 0)
         err =
             sslbp_remote_read(port, remote->channel, field->address, sslbp_field_bytes(field), &remote->values[index]);
     remote->known[index] = err == 0;
-    const int closed = guarded ? sslbp_nonvolatile(port, remote->channel, false) : 0;
+    const int closed = guarded ? sslbp_memory(port, remote->channel, LBP_MEMORY_WORKING) : 0;
     return err < 0 ? err : closed;
 }
 
