@@ -262,7 +262,7 @@ START_TEST(load_lines_of_linuxcnc_are_accepted)
     load(1, "config=\" num_encoders=1  num_stepgens=0x3 firmware=hm2/7i96s/x.bin sserial_port_0=00xxxxxx\" "
             "board_rtnet=posix firewall=none debug=1 debug_idrom=1 debug_module_descriptors=1 "
             "debug_pin_descriptors=1 debug_modules=1 use_serial_numbers=0 sserial_baudrate=-1");
-    ck_assert(strstr(hal.host.text, "IO Pin 017 (TB1-2/3): StepGen #0, pin Step"));
+    ck_assert(strstr(hal.host.text, "IO Pin 017 (TB1-2,3): StepGen #0, pin Step"));
     ck_assert(strstr(hal.host.text, "payload of a cycle: request "));
     talk_end(&hal);
     simulator_stop(&sim);
