@@ -184,7 +184,7 @@ static int prepare_write(struct flash_job *const job, const struct flash_image *
 {
     struct flash_card *const card = job->card;
     const struct flash_card_info *const info = &card->info;
-    struct flash_survey survey;
+    struct flash_survey survey = {0};
     int err = look_at_flash(job, &survey, diag);
     if (err == 0)
         err = flash_check_content(card, &survey, &job->options, diag);
@@ -290,7 +290,7 @@ static void add_area(struct flash_job *const job, const uint8_t *const dump, con
 /* The user area first; but an area that holds no image goes before one that does. */
 static int prepare_restore(struct flash_job *const job, const uint8_t *const dump, struct hm2_diag *const diag)
 {
-    struct flash_survey survey;
+    struct flash_survey survey = {0};
     int err = look_at_flash(job, &survey, diag);
     if (err < 0)
         return err;
