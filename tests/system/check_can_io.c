@@ -62,8 +62,6 @@ END_TEST
 
 int main(void)
 {
-    Suite *const suite = suite_create("can_io");
-    TCase *const tests = tcase_create("kernel");
     if (TEST_SANITIZED) {
         puts("SKIP: a sanitizer's memory does not fit into User Mode Linux\n100%: Checks: 1, Failures: 0, Errors: 0");
         return 0;
@@ -73,6 +71,8 @@ int main(void)
         puts("100%: Checks: 1, Failures: 0, Errors: 0"); /* the reason has been printed */
         return 0;
     }
+    Suite *const suite = suite_create("can_io");
+    TCase *const tests = tcase_create("kernel");
     tcase_set_timeout(tests, 60);
     tcase_add_loop_test(tests, on_a_kernel_with_can, 0, CASES);
     tcase_add_test(tests, no_case_is_forgotten);
