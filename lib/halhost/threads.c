@@ -274,9 +274,9 @@ static int join(struct hh_thread *const thread, struct hm2_diag *const diag)
     if (!thread->created)
         return 0;
     struct timespec limit;
-    (void)clock_gettime(CLOCK_REALTIME, &limit);
+    (void)clock_gettime(CLOCK_MONOTONIC, &limit); /* the time of day may be set meanwhile */
     limit.tv_sec += STOP_NS_LIMIT_S;
-    if (pthread_timedjoin_np(thread->thread, NULL, &limit)) {
+    if (pthread_clockjoin_np(thread->thread, NULL, CLOCK_MONOTONIC, &limit)) {
         const struct hh_funct *const funct = atomic_load(&thread->current);
         return hm2_diag_add(diag, HM2_ERR_TIMEOUT, "thread '%s' does not stop: function '%s' has not returned for %d s",
                             thread->names.name, funct ? funct->names.name : "?", STOP_NS_LIMIT_S);
