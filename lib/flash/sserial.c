@@ -67,12 +67,12 @@ static int read_value(const struct sslbp_port *const port, struct flash_remote *
     if (field->bits == 0 || field->bits > WIDEST)
         return 0;
     if (guarded)
-        err = sslbp_memory(port, remote->channel, LBP_MEMORY_EEPROM);
+        err = sslbp_select_memory(port, remote->channel, LBP_MEMORY_EEPROM);
     if (err == 0)
         err =
             sslbp_remote_read(port, remote->channel, field->address, sslbp_field_bytes(field), &remote->values[index]);
     remote->known[index] = err == 0;
-    const int closed = guarded ? sslbp_memory(port, remote->channel, LBP_MEMORY_WORKING) : 0;
+    const int closed = guarded ? sslbp_select_memory(port, remote->channel, LBP_MEMORY_WORKING) : 0;
     return err < 0 ? err : closed;
 }
 

@@ -50,7 +50,7 @@ static int port_write(void *const context, const uint16_t address, const unsigne
 static int port_memory(void *const context, const enum lbp_memory memory)
 {
     const struct lbp_port_channel *const at = context;
-    return sslbp_memory(at->port, at->channel, (uint8_t)memory);
+    return sslbp_select_memory(at->port, at->channel, (uint8_t)memory);
 }
 
 static int port_local(void *const context, const enum lbp_local code, uint8_t *const value)

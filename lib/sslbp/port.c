@@ -266,7 +266,7 @@ int sslbp_remote_write(const struct sslbp_port *const port, const unsigned chann
     return err < 0 ? remote_failed(port, channel, err, "writing", address) : 0;
 }
 
-int sslbp_memory(const struct sslbp_port *const port, const unsigned channel, const uint8_t memory)
+int sslbp_select_memory(const struct sslbp_port *const port, const unsigned channel, const uint8_t memory)
 {
     int err = poke(port, of_channel(port->user[0], channel), memory);
     if (err == 0)

@@ -135,7 +135,7 @@ HM2_API int HM2_MUST_CHECK sslbp_remote_read(const struct sslbp_port *port, unsi
 HM2_API int HM2_MUST_CHECK sslbp_remote_write(const struct sslbp_port *port, unsigned channel, uint16_t address,
                                               unsigned bytes, uint64_t value);
 /* What reads and writes mean from now on: 1 non-volatile parameters, 2 flash, 0 neither (register map 3.8.6). */
-HM2_API int HM2_MUST_CHECK sslbp_memory(const struct sslbp_port *port, unsigned channel, uint8_t memory);
+HM2_API int HM2_MUST_CHECK sslbp_select_memory(const struct sslbp_port *port, unsigned channel, uint8_t memory);
 /* A local LBP read, such as DF for the cookie. */
 HM2_API int HM2_MUST_CHECK sslbp_remote_local(const struct sslbp_port *port, unsigned channel, uint8_t code,
                                               uint8_t *value);
