@@ -107,6 +107,10 @@ static int known_line(const char *line, size_t len, const uint8_t hash[const FLA
         line++;
     if (len == 0)
         return hm2_diag_add(diag, HM2_ERR_MALFORMED, "no card stands behind the SHA-256");
+    for (size_t i = 0; i < len; i++)
+        if (line[i] < ' ' || line[i] > '~')
+            return hm2_diag_add(diag, HM2_ERR_MALFORMED,
+                                "the card behind the SHA-256 has characters no card's name has");
     if (memcmp(found, hash, sizeof found) != 0)
         return 0;
     flash_copy_text(card, (const uint8_t *)line, len);

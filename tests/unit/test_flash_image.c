@@ -208,8 +208,8 @@ static void looks_images_up_in_a_list(void **state)
         if (cards[i])
             assert_string_equal(card, cards[i]);
     }
-    static const char *const bad[] = {"\n" ZEROS "01\n", "\nabc 7I92\n", "\n" ZEROS "01x\n"};
-    for (unsigned i = 0; i < 3; i++) {
+    static const char *const bad[] = {"\n" ZEROS "01\n", "\nabc 7I92\n", "\n" ZEROS "01x\n", "\n" ZEROS "01 7I\0019"};
+    for (unsigned i = 0; i < 4; i++) {
         hm2_diag_clear(&diag);
         assert_int_equal(flash_known_image(bad[i], strlen(bad[i]), hash, card, &diag), HM2_ERR_MALFORMED);
         assert_non_null(strstr(diag.text, "line 2 "));
