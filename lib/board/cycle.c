@@ -340,7 +340,8 @@ static void take_reply(struct hm2_board *const board, const bool on_time)
 {
     board->outstanding = false;
     board->received_ns = link_now_ns(board->link);
-    board_pipeline_received(board, on_time);
+    if (board->pipeline.timer > 0)
+        board_pipeline_received(board, on_time);
 }
 
 static void note_plain_reply(struct hm2_board *const board)
@@ -424,7 +425,7 @@ void hm2_board_write(struct hm2_board *const board, const int64_t period_ns)
     /* A card that comes back drives nothing until a person has seen it. */
     call_all(&board->packs, board_cycle(board, now_ns, restores || hm2_watchdog_bitten(board->watchdog)));
     size_t len;
-    const bool turns = board_pipeline_turns(board, now_ns);
+    const bool turns = board->pipeline.timer > 0 && board_pipeline_turns(board, now_ns);
     const uint8_t *const bytes =
         turns ? hm2_plan_turn(board->plan, board_pipeline_timeout_us(board), &len) : hm2_plan_write(board->plan, &len);
     if (board->writes > 0 && now_ns - board->write_ns > board->write_gap_ns)

@@ -109,8 +109,6 @@ static void note_work(struct hm2_board *const board, const int64_t now_ns)
 bool board_pipeline_turns(struct hm2_board *const board, const int64_t now_ns)
 {
     struct board_pipeline *const p = &board->pipeline;
-    if (p->timer == 0)
-        return false;
     if (board->outstanding || board->cycles == 0 || board->recovery != BOARD_NORMAL ||
         !hm2_plan_pipelines(board->plan)) {
         board_pipeline_stop(board);
@@ -142,8 +140,6 @@ void board_pipeline_lost(struct hm2_board *const board)
 void board_pipeline_received(struct hm2_board *const board, const bool on_time)
 {
     struct board_pipeline *const p = &board->pipeline;
-    if (p->timer == 0)
-        return;
     if (!p->turned) {
         *p->points->data_age_us = (double)(board->received_ns - board->request_ns) * 1e-3;
         return;

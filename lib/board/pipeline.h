@@ -34,13 +34,13 @@ struct board_pipeline {
     struct board_pipeline_points *points;
 };
 
-/* Once in every write, after the modules have packed: shall it be a turn? */
+/* Of cards that were asked to pipeline: once in every write, after the modules have packed: shall it be a turn? */
 bool board_pipeline_turns(struct hm2_board *board, int64_t now_ns);
 /* For hm2_plan_turn(). */
 uint16_t board_pipeline_timeout_us(const struct hm2_board *board);
 /* Plain cycles from now on, until there is room again. */
 void board_pipeline_stop(struct hm2_board *board);
-/* A good reply; when it answers a turn: was it there when read began? */
+/* The same: a good reply; when it answers a turn: was it there when read began? */
 void board_pipeline_received(struct hm2_board *board, bool on_time);
 /* The reply to a turn did not come. */
 void board_pipeline_lost(struct hm2_board *board);

@@ -190,6 +190,14 @@ HM2_RARE static void resend_undone(struct hm2_plan *const plan, const uint32_t f
     }
 }
 
+static void take_extra(struct hm2_plan *const plan, const uint8_t extra[const PLAN_EXTRA_BYTES])
+{
+    const uint32_t found = hm2_get_le32(extra + PLAN_EXTRA_BEFORE);
+    if (hm2_delta32(plan->section_write_seq, found) > 0)
+        resend_undone(plan, found);
+    plan->facts.waited_us = hm2_get_le16(extra + PLAN_EXTRA_WAITED);
+}
+
 static void accept(struct hm2_plan *const plan)
 {
     memcpy(plan->reply, plan->landing, plan->reply_len);
@@ -206,9 +214,9 @@ static void accept(struct hm2_plan *const plan)
 
 enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
 {
-    bool is_turn;
-    uint8_t extra[PLAN_EXTRA_BYTES] = {0};
-    if (plan_unfold_turn(plan, len, &is_turn, extra) != plan->reply_len)
+    bool is_turn = false;
+    uint8_t extra[PLAN_EXTRA_BYTES];
+    if ((plan->pipelines ? plan_unfold_turn(plan, len, &is_turn, extra) : len) != plan->reply_len)
         return HM2_REPLY_MALFORMED;
     const uint8_t *const trailer = plan->landing + plan->reply_len - PLAN_TRAILER_BYTES;
     const uint64_t age = requests_since(plan, hm2_get_le32(trailer + PLAN_TRAILER_REQUEST));
@@ -224,10 +232,9 @@ enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
         plan->late_request = age < 64 && number > plan->requests_before ? number : 0;
         return HM2_REPLY_LATE;
     }
-    const uint32_t found = hm2_get_le32(extra + PLAN_EXTRA_BEFORE);
-    if (is_turn && hm2_delta32(plan->section_write_seq, found) > 0)
-        resend_undone(plan, found);
-    plan->facts.waited_us = hm2_get_le16(extra + PLAN_EXTRA_WAITED);
+    plan->facts.waited_us = 0;
+    if (is_turn)
+        take_extra(plan, extra);
     accept(plan);
     return HM2_REPLY_FRESH;
 }
@@ -274,7 +281,7 @@ static size_t add_sections(struct hm2_plan *const plan, size_t used, const size_
     return used;
 }
 
-size_t plan_compose_write(struct hm2_plan *const plan, const size_t most)
+static inline size_t compose(struct hm2_plan *const plan, const size_t most)
 {
     size_t used = plan->fixed_len;
     plan->write_seq = next_seq(plan->write_seq);
@@ -291,9 +298,14 @@ size_t plan_compose_write(struct hm2_plan *const plan, const size_t most)
     return used + PLAN_NUMBER_BYTES;
 }
 
+size_t plan_compose_write(struct hm2_plan *const plan, const size_t most)
+{
+    return compose(plan, most);
+}
+
 const uint8_t *hm2_plan_write(struct hm2_plan *const plan, size_t *const len)
 {
-    *len = plan_compose_write(plan, sizeof plan->write);
+    *len = compose(plan, sizeof plan->write);
     return plan->write;
 }
 

@@ -192,8 +192,15 @@ static void start(struct hm2_module *const module, const struct hm2_cycle *const
 
 /* The card steps at the rate that it was given, so that where a generator is by now follows from where it was when the
  * registers were read. */
-static inline void unpack_all(struct stepgen_module *const ctx, const unsigned instances, const double age_s,
-                              const bool has_latch)
+static void carry_forward(struct stepgen_module *const ctx, const unsigned instances, const double age_s)
+{
+    for (struct stepgen *gen = ctx->generator, *const end = gen + instances; gen < end; gen++) {
+        gen->position += gen->velocity * age_s;
+        *gen->position_fb = gen->position;
+    }
+}
+
+static inline void unpack_all(struct stepgen_module *const ctx, const unsigned instances, const bool has_latch)
 {
     const uint8_t *accumulators = ctx->accumulators.bytes;
     for (struct stepgen *gen = ctx->generator, *const end = gen + instances; gen < end; gen++, accumulators += 4) {
@@ -207,7 +214,7 @@ static inline void unpack_all(struct stepgen_module *const ctx, const unsigned i
             stepgen_unpack_latch(gen, hm2_window_get(&ctx->latches, gen->number));
         if (*gen->position_reset)
             gen->subcounts = 0;
-        gen->position = (double)gen->subcounts * (1.0 / SUBCOUNTS_PER_STEP) / gen->scale + gen->velocity * age_s;
+        gen->position = (double)gen->subcounts * (1.0 / SUBCOUNTS_PER_STEP) / gen->scale;
         *gen->counts = (int32_t)(uint32_t)((uint64_t)gen->subcounts >> 16);
         *gen->position_fb = gen->position;
     }
@@ -219,9 +226,11 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     if (!ctx)
         return;
     if (ctx->has_latch)
-        unpack_all(ctx, module->instances, cycle->age_s, true);
+        unpack_all(ctx, module->instances, true);
     else
-        unpack_all(ctx, module->instances, cycle->age_s, false);
+        unpack_all(ctx, module->instances, false);
+    if (cycle->age_s > 0.0)
+        carry_forward(ctx, module->instances, cycle->age_s);
 }
 
 static const struct hm2_md_variant variants[] = {
