@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <hm2/lbp.h>
+
 #include "bind.h"
 #include "sserial.h"
 
@@ -287,16 +289,14 @@ static int bind_fields(const struct making *const making_, const struct sslbp_ta
 /* ---- parameters ---------------------------------------------------------------------------------------------------
  */
 
-enum { MEMORY_WORKING = 0, MEMORY_EEPROM = 1 };
-
 static int read_global(const struct sslbp_port *const access, const unsigned channel,
                        const struct sserial_global *const global, uint64_t *const raw)
 {
-    int err = global->nonvolatile ? sslbp_select_memory(access, channel, MEMORY_EEPROM) : 0;
+    int err = global->nonvolatile ? sslbp_select_memory(access, channel, LBP_MEMORY_EEPROM) : 0;
     if (err == 0)
         err = sslbp_remote_read(access, channel, global->address, global->bytes, raw);
     if (err == 0 && global->nonvolatile)
-        err = sslbp_select_memory(access, channel, MEMORY_WORKING);
+        err = sslbp_select_memory(access, channel, LBP_MEMORY_WORKING);
     return err;
 }
 
