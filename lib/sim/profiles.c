@@ -108,46 +108,6 @@ static const struct sim_firmware firmware_7i96s_7i77d = {
     .local_pin_count = ROWS(local_pins_7i96s),
 };
 
-/* Register map 5.1 and 5.2.1: SVST8_4IM2 with the new address map and the DPLL in front, cut at 48 pins. */
-static const struct sim_module_row modules_7i93[] = {
-    {HM2_GTAG_DPLL, 0x00, LOW, 1, 0x7000, 7, 0x00, 0x00000000},
-    {HM2_GTAG_WATCHDOG, 0x00, LOW, 1, 0x0C00, 3, 0x00, 0x00000000},
-    {HM2_GTAG_IOPORT, 0x00, LOW, 2, 0x1000, 5, 0x00, 0x0000001F},
-    {HM2_GTAG_ENCODER, 0x02, LOW, 8, 0x3000, 5, 0x00, 0x00000003},
-    {HM2_GTAG_PWMGEN, 0x00, HIGH, 8, 0x4100, 5, 0x00, 0x00000003},
-    {HM2_GTAG_STEPGEN, 0x02, LOW, 4, 0x2000, 10, 0x00, 0x000001FF},
-    {HM2_GTAG_LED, 0x00, LOW, 1, 0x0200, 1, 0x00, 0x00000000},
-};
-
-static const struct sim_pin_row pins_7i93[] = {
-    {HM2_GTAG_ENCODER, 1, 0x02}, {HM2_GTAG_ENCODER, 1, 0x01}, {HM2_GTAG_ENCODER, 0, 0x02}, {HM2_GTAG_ENCODER, 0, 0x01},
-    {HM2_GTAG_ENCODER, 1, 0x03}, {HM2_GTAG_ENCODER, 0, 0x03}, {HM2_GTAG_PWMGEN, 1, 0x81},  {HM2_GTAG_PWMGEN, 0, 0x81},
-    {HM2_GTAG_PWMGEN, 1, 0x82},  {HM2_GTAG_PWMGEN, 0, 0x82},  {HM2_GTAG_PWMGEN, 1, 0x83},  {HM2_GTAG_PWMGEN, 0, 0x83},
-    {HM2_GTAG_ENCODER, 3, 0x02}, {HM2_GTAG_ENCODER, 3, 0x01}, {HM2_GTAG_ENCODER, 2, 0x02}, {HM2_GTAG_ENCODER, 2, 0x01},
-    {HM2_GTAG_ENCODER, 3, 0x03}, {HM2_GTAG_ENCODER, 2, 0x03}, {HM2_GTAG_PWMGEN, 3, 0x81},  {HM2_GTAG_PWMGEN, 2, 0x81},
-    {HM2_GTAG_PWMGEN, 3, 0x82},  {HM2_GTAG_PWMGEN, 2, 0x82},  {HM2_GTAG_PWMGEN, 3, 0x83},  {HM2_GTAG_PWMGEN, 2, 0x83},
-    {HM2_GTAG_ENCODER, 5, 0x02}, {HM2_GTAG_ENCODER, 5, 0x01}, {HM2_GTAG_ENCODER, 4, 0x02}, {HM2_GTAG_ENCODER, 4, 0x01},
-    {HM2_GTAG_ENCODER, 5, 0x03}, {HM2_GTAG_ENCODER, 4, 0x03}, {HM2_GTAG_PWMGEN, 5, 0x81},  {HM2_GTAG_PWMGEN, 4, 0x81},
-    {HM2_GTAG_PWMGEN, 5, 0x82},  {HM2_GTAG_PWMGEN, 4, 0x82},  {HM2_GTAG_PWMGEN, 5, 0x83},  {HM2_GTAG_PWMGEN, 4, 0x83},
-    {HM2_GTAG_ENCODER, 7, 0x02}, {HM2_GTAG_ENCODER, 7, 0x01}, {HM2_GTAG_ENCODER, 6, 0x02}, {HM2_GTAG_ENCODER, 6, 0x01},
-    {HM2_GTAG_ENCODER, 7, 0x03}, {HM2_GTAG_ENCODER, 6, 0x03}, {HM2_GTAG_PWMGEN, 7, 0x81},  {HM2_GTAG_PWMGEN, 6, 0x81},
-    {HM2_GTAG_PWMGEN, 7, 0x82},  {HM2_GTAG_PWMGEN, 6, 0x82},  {HM2_GTAG_PWMGEN, 7, 0x83},  {HM2_GTAG_PWMGEN, 6, 0x83},
-};
-
-static const struct sim_firmware firmware_7i93 = {
-    .board_name = "MESA7I93",
-    .fpga_size = 9,
-    .fpga_pins = 144,
-    .io_ports = 2,
-    .port_width = 24,
-    .clock_low_hz = 100000000,
-    .clock_high_hz = 200000000,
-    .modules = modules_7i93,
-    .module_count = ROWS(modules_7i93),
-    .pins = pins_7i93,
-    .pin_count = ROWS(pins_7i93),
-};
-
 /* Firmware with nothing but ports, as pin package JUSTIO_72 of the recorded LBP16 exchanges, for each card. */
 #define PLAIN_MODULES(ports)                                                  \
     {                                                                         \
@@ -204,7 +164,7 @@ static const struct sim_firmware plain_litehm2 = PLAIN("LITEHM2", SLX16, 3, 24);
 #define CARDS(CARD)                                                                   \
     CARD("7i96s", "7I96S", T20, MANUAL, firmware_7i96s)                               \
     CARD("7i96s_7i77d", "7I96S", T20, MANUAL, firmware_7i96s_7i77d)                   \
-    CARD("7i93", "7I93", SLX9, MANUAL, firmware_7i93)                                 \
+    CARD("7i93", "7I93", SLX9, MANUAL, sim_firmware_7i93_svst8_4im2)                  \
     CARD("7i93_svst4_8", "7I93", SLX9, MANUAL, sim_firmware_7i93_svst4_8)             \
     CARD("7i93_svst8_8im2", "7I93", SLX9, MANUAL, sim_firmware_7i93_svst8_8im2)       \
     CARD("7i93_svst1_4_7i47s", "7I93", SLX9, MANUAL, sim_firmware_7i93_svst1_4_7i47s) \

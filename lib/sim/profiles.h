@@ -50,7 +50,7 @@ struct sim_profile {
 const struct sim_profile *sim_profile_find(const char *name);
 /* All names, with blanks between them, for messages. */
 void sim_profile_list(char *text, size_t size);
-extern const struct sim_firmware sim_firmware_7i93_svst4_8, sim_firmware_7i93_svst8_8im2,
+extern const struct sim_firmware sim_firmware_7i93_svst4_8, sim_firmware_7i93_svst8_8im2, sim_firmware_7i93_svst8_4im2,
     sim_firmware_7i93_svst1_4_7i47s, sim_firmware_7i93_2x7i65, sim_firmware_7i93_sv12im_2x7i48,
     sim_firmware_7i93_sv6_7i49;
 void sim_profile_image(const struct sim_profile *profile, struct hm2_image *image);
