@@ -43,20 +43,18 @@ static void check_kind(struct patient *const p)
 
 static void check_driver(struct patient *const p, const char *const ethtool)
 {
+    static const char at_usb[] = "it is at USB, which adds a millisecond at times";
+    static const char no_usb[] = "use a network port of the main board or a PCI card";
     /* What users report of them, and LinuxCNC's forum with them. */
     static const struct {
         const char *driver, *why, *what;
     } known[] = {
         {"r8169", "it loses the cycle now and then with power saving of the bus",
          "apt-get install r8168-dkms (then restart)"},
-        {"ax88179_178a", "it is at USB, which adds a millisecond at times",
-         "use a network port of the main board or a PCI card"},
-        {"r8152", "it is at USB, which adds a millisecond at times",
-         "use a network port of the main board or a PCI card"},
-        {"asix", "it is at USB, which adds a millisecond at times",
-         "use a network port of the main board or a PCI card"},
-        {"cdc_ether", "it is at USB, which adds a millisecond at times",
-         "use a network port of the main board or a PCI card"},
+        {"ax88179_178a", at_usb, no_usb},
+        {"r8152", at_usb, no_usb},
+        {"asix", at_usb, no_usb},
+        {"cdc_ether", at_usb, no_usb},
     };
     char driver[32];
     if (!text_named_word(ethtool, "driver", driver, sizeof driver))

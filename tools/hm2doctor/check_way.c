@@ -35,9 +35,10 @@ static const char *next_line(const char *const at)
     return end ? end + 1 : NULL;
 }
 
-static bool routes(struct patient *const p, char *const text, const size_t cap)
+void look_at_routes(struct patient *const p)
 {
-    return state_text(p->state, text, cap, "proc/net/route");
+    if (!state_text(p->state, p->routes, sizeof p->routes, "proc/net/route"))
+        p->routes[0] = '\0';
 }
 
 /* The route with the longest mask that the card's address matches. */
@@ -56,13 +57,12 @@ static bool best_route(const char *const text, const uint32_t card, struct route
 
 bool find_interface(struct patient *const p)
 {
-    static char text[STATE_TEXT_BYTES];
     struct route route;
     if (p->card >> 24 == LOOPBACK_NET) {
         snprintf(p->interface, sizeof p->interface, "lo");
         return true;
     }
-    if (!routes(p, text, sizeof text) || !best_route(text, p->card, &route))
+    if (!best_route(p->routes, p->card, &route))
         return false;
     memcpy(p->interface, route.interface, sizeof p->interface);
     return true;
@@ -76,11 +76,10 @@ static void card_text(const uint32_t card, char text[INET_ADDRSTRLEN])
 
 static void check_route(struct patient *const p)
 {
-    static char text[STATE_TEXT_BYTES];
     char card[INET_ADDRSTRLEN];
     struct route route = {.mask = 0};
     card_text(p->card, card);
-    if (!routes(p, text, sizeof text) || !best_route(text, p->card, &route)) {
+    if (!best_route(p->routes, p->card, &route)) {
         remedy(find(p->findings, "route", GRADE_FAULT, "there is no way to %s", card), false,
                "ip addr add %u.%u.%u.1/24 dev INTERFACE (the one with the card's cable)", p->card >> 24,
                p->card >> 16 & 255, p->card >> 8 & 255);
@@ -100,10 +99,9 @@ static void check_route(struct patient *const p)
 /* A network port that leads elsewhere, too, has other packets in the way. */
 static void check_sharing(struct patient *const p)
 {
-    static char text[STATE_TEXT_BYTES];
-    if (!routes(p, text, sizeof text))
+    if (p->routes[0] == '\0')
         return;
-    for (const char *line = next_line(text); line; line = next_line(line)) {
+    for (const char *line = next_line(p->routes); line; line = next_line(line)) {
         struct route route;
         if (parse_route(line, &route) && route.mask == 0 && strcmp(route.interface, p->interface) == 0) {
             remedy(find(p->findings, "sharing", GRADE_ADVICE, "%s also leads to everything else (default route)",

@@ -72,6 +72,7 @@ struct patient {
     struct state *state;
     char interface[INTERFACE_BYTES]; /* empty when it could not be found */
     uint32_t card;                   /* IPv4 address, host byte order */
+    char routes[STATE_TEXT_BYTES];   /* read by look_at_routes(); empty when there are none to be read */
     long period_us;
     struct findings *findings;
 };
@@ -79,7 +80,9 @@ struct patient {
 void check_computer(struct patient *patient);
 void check_interface(struct patient *patient);
 void check_way(struct patient *patient);
-/* The interface by which the card is reached, from the routing table. */
+/* Read the routing table, which what follows needs. */
+void look_at_routes(struct patient *patient);
+/* The interface by which the card is reached. */
 bool find_interface(struct patient *patient);
 
 /* ---- round trips ------------------------------------------------------------------------------------------------- */

@@ -290,6 +290,7 @@ static int visit(const struct request *const request)
     struct rounds rounds = {.paced = 0};
     if (!card_address(request->card, &patient.card))
         return EXIT_USAGE;
+    look_at_routes(&patient);
     if (request->interface)
         snprintf(patient.interface, sizeof patient.interface, "%s", request->interface);
     else if (find_interface(&patient) && !good_interface(patient.interface))
