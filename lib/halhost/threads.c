@@ -131,6 +131,12 @@ static void *thread_main(void *const argument)
     return NULL;
 }
 
+static void nap(void)
+{
+    const struct timespec step = {.tv_nsec = QUIESCE_STEP_NS};
+    (void)clock_nanosleep(CLOCK_MONOTONIC, 0, &step, NULL);
+}
+
 int hh_thread_quiesce(const struct hh_thread *const thread, struct hm2_diag *const diag)
 {
     if (!thread->created)
@@ -141,8 +147,7 @@ int hh_thread_quiesce(const struct hh_thread *const thread, struct hm2_diag *con
         if (hh_now_ns() > limit_ns)
             return hm2_diag_add(diag, HM2_ERR_TIMEOUT, "thread '%s' has not ended its cycle for %d s",
                                 thread->names.name, STOP_NS_LIMIT_S);
-        const struct timespec step = {.tv_nsec = QUIESCE_STEP_NS};
-        (void)clock_nanosleep(CLOCK_MONOTONIC, 0, &step, NULL);
+        nap();
     }
     return 0;
 }
@@ -269,14 +274,18 @@ void hh_threads_ask_to_stop(struct hh *const host)
     }
 }
 
+/* Tried again and again: of the joins with a time limit one measures it by the time of day, which may be set meanwhile,
+ * and the other is unknown to thread sanitizers. */
 static int join(struct hh_thread *const thread, struct hm2_diag *const diag)
 {
     if (!thread->created)
         return 0;
-    struct timespec limit;
-    (void)clock_gettime(CLOCK_MONOTONIC, &limit); /* the time of day may be set meanwhile */
-    limit.tv_sec += STOP_NS_LIMIT_S;
-    if (pthread_clockjoin_np(thread->thread, NULL, CLOCK_MONOTONIC, &limit)) {
+    const int64_t limit_ns = hh_now_ns() + (int64_t)STOP_NS_LIMIT_S * NS_PER_S;
+    while (pthread_tryjoin_np(thread->thread, NULL)) {
+        if (hh_now_ns() <= limit_ns) {
+            nap();
+            continue;
+        }
         const struct hh_funct *const funct = atomic_load(&thread->current);
         return hm2_diag_add(diag, HM2_ERR_TIMEOUT, "thread '%s' does not stop: function '%s' has not returned for %d s",
                             thread->names.name, funct ? funct->names.name : "?", STOP_NS_LIMIT_S);
