@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "servo_rig.h"
 
-int servo_set_up(void **state)
+int servo_set_up_card(void **state, const struct sim_card_options *const options)
 {
     struct servo_rig *const f = calloc(1, sizeof *f);
     assert_non_null(f);
-    const struct sim_card_options options = {.profile = "7i96s", .seed = 1};
-    if (sim_card_new(&f->card, &options, &f->diag) != 0)
+    if (sim_card_new(&f->card, options, &f->diag) != 0)
         fail_msg("%s", f->diag.text);
     assert_int_equal(sim_net_new(&f->net, f->card, NULL), 0);
     f->link = sim_net_link(f->net);
@@ -18,6 +17,11 @@ int servo_set_up(void **state)
     f->work_ns = WORK_NS;
     *state = f;
     return 0;
+}
+
+int servo_set_up(void **state)
+{
+    return servo_set_up_card(state, &(struct sim_card_options){.profile = "7i96s", .seed = 1});
 }
 
 int servo_tear_down(void **state)
@@ -46,16 +50,25 @@ void servo_set(const struct servo_rig *const f, const char *const name, const do
 {
     char full[128];
     (void)snprintf(full, sizeof full, PREFIX "%s", name);
-    assert_int_equal(hm2_plain_set(f->plain, full, value), 0);
+    if (hm2_plain_set(f->plain, full, value) != 0)
+        fail_msg("no point %s", full);
+}
+
+int servo_try_load(struct servo_rig *const f, const char *const config)
+{
+    int err = hm2_board_identify(f->board, f->link, &f->diag);
+    if (err == 0)
+        err = hm2_board_setup(f->board, 0, hm2_plain_binder(f->plain), config, &f->diag);
+    if (err == 0)
+        err = hm2_board_start(f->board, &f->diag);
+    f->start_ns = link_now_ns(f->link);
+    return err;
 }
 
 void servo_load(struct servo_rig *const f, const char *const config)
 {
-    if (hm2_board_identify(f->board, f->link, &f->diag) != 0 ||
-        hm2_board_setup(f->board, 0, hm2_plain_binder(f->plain), config, &f->diag) != 0 ||
-        hm2_board_start(f->board, &f->diag) != 0)
+    if (servo_try_load(f, config) != 0)
         fail_msg("%s", f->diag.text);
-    f->start_ns = link_now_ns(f->link);
 }
 
 void servo_cycle(struct servo_rig *const f)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* A board on a simulated 7I96S and the servo thread that runs it, in virtual time. */
+/* A board on a simulated card, a 7I96S unless told otherwise, and the servo thread that runs it, in virtual time. */
 #ifndef SERVO_RIG_H
 #define SERVO_RIG_H
 
@@ -28,10 +28,12 @@ struct servo_rig {
 
 /* Fixtures of cmocka. */
 int servo_set_up(void **state);
+int servo_set_up_card(void **state, const struct sim_card_options *options); /* another card */
 int servo_tear_down(void **state);
 
 double servo_get(const struct servo_rig *rig, const char *name);
 void servo_set(const struct servo_rig *rig, const char *name, double value);
+int servo_try_load(struct servo_rig *rig, const char *config); /* 0 or an error of the board's, told in diag */
 void servo_load(struct servo_rig *rig, const char *config);
 /* A thread that begins its cycle on time, or as soon as the one before has ended. */
 void servo_cycle(struct servo_rig *rig);

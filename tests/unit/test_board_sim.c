@@ -1,13 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* A board with every module of the library, on a simulated 7I96S. */
-#include "unit.h"
+#include "servo_rig.h"
 
-#include <hm2/board.h>
 #include <hm2/lbp16.h>
-#include <hm2/sim.h>
-
-#define PERIOD_NS 1000000
-#define PREFIX    "hm2_7i96s.0."
 
 /* ---- who allocates? -----------------------------------------------------------------------------------------------
  */
@@ -44,97 +39,6 @@ void *realloc(void *const memory, const size_t size)
 
 enum { STEP_IO = 17 }; /* step of stepgen 0 */
 
-struct fixture {
-    struct sim_card *card;
-    struct sim_net *net;
-    struct link *link;
-    struct hm2_board *board;
-    struct hm2_plain_binder *plain;
-    struct hm2_diag diag;
-};
-
-static int set_up(void **state)
-{
-    struct fixture *const f = calloc(1, sizeof *f);
-    assert_non_null(f);
-    const struct sim_card_options options = {.profile = "7i96s", .seed = 1};
-    if (sim_card_new(&f->card, &options, &f->diag) != 0)
-        fail_msg("%s", f->diag.text);
-    assert_int_equal(sim_net_new(&f->net, f->card, NULL), 0);
-    f->link = sim_net_link(f->net);
-    f->board = hm2_board_new();
-    f->plain = hm2_plain_binder_new();
-    assert_non_null(f->board);
-    assert_non_null(f->plain);
-    *state = f;
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    struct fixture *const f = *state;
-    hm2_board_free(f->board);
-    hm2_plain_binder_free(f->plain);
-    sim_net_free(f->net);
-    sim_card_free(f->card);
-    free(f);
-    return 0;
-}
-
-static void load(struct fixture *const f, const char *const config)
-{
-    if (hm2_board_identify(f->board, f->link, &f->diag) != 0 ||
-        hm2_board_setup(f->board, 0, hm2_plain_binder(f->plain), config, &f->diag) != 0 ||
-        hm2_board_start(f->board, &f->diag) != 0)
-        fail_msg("%s", f->diag.text);
-}
-
-static const char *full_name(char text[128], const char *const name)
-{
-    (void)snprintf(text, 128, PREFIX "%s", name);
-    return text;
-}
-
-static double get(const struct fixture *const f, const char *const name)
-{
-    char full[128];
-    int err;
-    const double value = hm2_plain_get(f->plain, full_name(full, name), &err);
-    if (err)
-        fail_msg("no point %s", full);
-    return value;
-}
-
-static void set(const struct fixture *const f, const char *const name, const double value)
-{
-    char full[128];
-    assert_int_equal(hm2_plain_set(f->plain, full_name(full, name), value), 0);
-}
-
-static void cycle(struct fixture *const f)
-{
-    const int64_t begin_ns = link_now_ns(f->link);
-    hm2_board_read(f->board, PERIOD_NS);
-    hm2_board_write(f->board, PERIOD_NS);
-    sim_net_sleep_until(f->net, begin_ns + PERIOD_NS);
-}
-
-static void cycles(struct fixture *const f, const unsigned count)
-{
-    for (unsigned i = 0; i < count; i++)
-        cycle(f);
-}
-
-static bool message(const struct fixture *const f, const char *const words)
-{
-    char text[1024];
-    bool error;
-    while (hm2_board_next_message(f->board, text, sizeof text, &error) > 0)
-        if (strstr(text, words))
-            return true;
-    return false;
-}
-
 /* ---- names --------------------------------------------------------------------------------------------------------
  */
 
@@ -152,7 +56,7 @@ static bool is_better(const char *const name)
     return strcmp(name, PREFIX "packet-error-decrement") == 0;
 }
 
-static unsigned check_object(const struct fixture *const f, const char *const line)
+static unsigned check_object(const struct servo_rig *const f, const char *const line)
 {
     char kind[16], type[16], dir[16], name[128], found[64], wanted[64];
     double value = 0;
@@ -174,7 +78,7 @@ static unsigned check_object(const struct fixture *const f, const char *const li
 
 static void every_object_of_the_original_driver_is_there(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     if (hm2_board_identify(f->board, f->link, &f->diag) != 0 ||
         hm2_board_setup(f->board, 0, hm2_plain_binder(f->plain), NULL, &f->diag) != 0)
         fail_msg("%s", f->diag.text);
@@ -203,19 +107,19 @@ static void every_object_of_the_original_driver_is_there(void **state)
 
 static void outputs_are_inactive_until_the_first_write_and_after_stop(void **state)
 {
-    struct fixture *const f = *state;
-    load(f, NULL);
-    set(f, "gpio.034.is_output", 1);
+    struct servo_rig *const f = *state;
+    servo_load(f, NULL);
+    servo_set(f, "gpio.034.is_output", 1);
     for (unsigned io = 0; io < 51; io++)
         assert_int_equal(sim_card_pad(f->card, io), SIM_FLOAT);
     hm2_board_read(f->board, PERIOD_NS);
     assert_int_equal(sim_card_pad(f->card, STEP_IO), SIM_FLOAT);
-    cycles(f, 2);
+    servo_cycles(f, 2);
     assert_int_not_equal(sim_card_pad(f->card, STEP_IO), SIM_FLOAT);
     assert_int_equal(sim_card_pad(f->card, 34), SIM_LOW);
-    cycles(f, 100);
-    assert_true(get(f, "packet-error-total") == 0);
-    assert_true(get(f, "watchdog.has_bit") == 0);
+    servo_cycles(f, 100);
+    assert_true(servo_get(f, "packet-error-total") == 0);
+    assert_true(servo_get(f, "watchdog.has_bit") == 0);
     hm2_board_stop(f->board);
     sim_net_sleep_until(f->net, link_now_ns(f->link) + PERIOD_NS);
     assert_int_equal(sim_card_pad(f->card, STEP_IO), SIM_FLOAT);
@@ -224,19 +128,19 @@ static void outputs_are_inactive_until_the_first_write_and_after_stop(void **sta
 
 static void a_step_generator_arrives_where_it_is_sent(void **state)
 {
-    struct fixture *const f = *state;
-    load(f, NULL);
-    set(f, "stepgen.00.position-scale", 1000);
-    set(f, "stepgen.00.steplen", 1000);
-    set(f, "stepgen.00.stepspace", 1000);
-    set(f, "stepgen.00.maxaccel", 100);
-    set(f, "stepgen.00.maxvel", 50);
-    set(f, "stepgen.00.enable", 1);
+    struct servo_rig *const f = *state;
+    servo_load(f, NULL);
+    servo_set(f, "stepgen.00.position-scale", 1000);
+    servo_set(f, "stepgen.00.steplen", 1000);
+    servo_set(f, "stepgen.00.stepspace", 1000);
+    servo_set(f, "stepgen.00.maxaccel", 100);
+    servo_set(f, "stepgen.00.maxvel", 50);
+    servo_set(f, "stepgen.00.enable", 1);
     for (unsigned i = 0; i < 2000; i++) {
-        set(f, "stepgen.00.position-cmd", i < 1000 ? i * 0.01 : 10.0);
-        cycle(f);
+        servo_set(f, "stepgen.00.position-cmd", i < 1000 ? i * 0.01 : 10.0);
+        servo_cycle(f);
     }
-    const double position = get(f, "stepgen.00.position-fb");
+    const double position = servo_get(f, "stepgen.00.position-fb");
     if (position < 9.999 || position > 10.001)
         fail_msg("position-fb is %g, expected 10", position);
 }
@@ -246,87 +150,87 @@ static void a_step_generator_arrives_where_it_is_sent(void **state)
 
 static void a_held_up_thread_makes_the_watchdog_bite_and_says_so(void **state)
 {
-    struct fixture *const f = *state;
-    load(f, NULL);
-    cycles(f, 100);
+    struct servo_rig *const f = *state;
+    servo_load(f, NULL);
+    servo_cycles(f, 100);
     assert_int_not_equal(sim_card_pad(f->card, STEP_IO), SIM_FLOAT);
     sim_net_sleep_until(f->net, link_now_ns(f->link) + 10 * PERIOD_NS);
     assert_int_equal(sim_card_pad(f->card, STEP_IO), SIM_FLOAT);
-    cycles(f, 3);
-    assert_true(get(f, "watchdog.has_bit") == 1);
-    assert_true(message(f, "Reason: late write"));
-    cycles(f, 50);
+    servo_cycles(f, 3);
+    assert_true(servo_get(f, "watchdog.has_bit") == 1);
+    assert_true(servo_message(f, "Reason: late write"));
+    servo_cycles(f, 50);
     assert_int_equal(sim_card_pad(f->card, STEP_IO), SIM_FLOAT);
-    set(f, "watchdog.has_bit", 0);
-    cycles(f, 3);
+    servo_set(f, "watchdog.has_bit", 0);
+    servo_cycles(f, 3);
     assert_int_not_equal(sim_card_pad(f->card, STEP_IO), SIM_FLOAT);
-    cycles(f, 20);
-    assert_true(get(f, "watchdog.has_bit") == 0);
+    servo_cycles(f, 20);
+    assert_true(servo_get(f, "watchdog.has_bit") == 0);
 }
 
 /* The card needs longer to configure its FPGA than the error level allows: a person clears io_error. */
-static void power_cycle(struct fixture *const f)
+static void power_cycle(struct servo_rig *const f)
 {
     sim_card_power_cycle(f->card);
-    cycles(f, 1000);
-    assert_true(get(f, "io_error") == 1);
-    set(f, "io_error", 0);
+    servo_cycles(f, 1000);
+    assert_true(servo_get(f, "io_error") == 1);
+    servo_set(f, "io_error", 0);
 }
 
 static void a_power_cycle_is_survived_with_outputs_off_until_a_person_agrees(void **state)
 {
-    struct fixture *const f = *state;
-    load(f, NULL);
-    set(f, "gpio.040.is_output", 1);
-    set(f, "gpio.040.out", 1);
-    cycles(f, 100);
+    struct servo_rig *const f = *state;
+    servo_load(f, NULL);
+    servo_set(f, "gpio.040.is_output", 1);
+    servo_set(f, "gpio.040.out", 1);
+    servo_cycles(f, 100);
     assert_int_equal(sim_card_pad(f->card, 40), SIM_HIGH);
     power_cycle(f);
     for (unsigned i = 0; i < 200; i++) {
-        cycle(f);
+        servo_cycle(f);
         assert_int_equal(sim_card_pad(f->card, 40), SIM_FLOAT);
         assert_int_equal(sim_card_pad(f->card, STEP_IO), SIM_FLOAT);
     }
-    assert_true(get(f, "watchdog.has_bit") == 1);
-    assert_true(get(f, "io_error") == 0);
-    assert_true(get(f, "packet-error") == 0);
-    assert_true(message(f, "has lost its state"));
-    assert_true(message(f, "is back with the same firmware"));
-    set(f, "watchdog.has_bit", 0);
-    cycles(f, 10);
+    assert_true(servo_get(f, "watchdog.has_bit") == 1);
+    assert_true(servo_get(f, "io_error") == 0);
+    assert_true(servo_get(f, "packet-error") == 0);
+    assert_true(servo_message(f, "has lost its state"));
+    assert_true(servo_message(f, "is back with the same firmware"));
+    servo_set(f, "watchdog.has_bit", 0);
+    servo_cycles(f, 10);
     assert_int_equal(sim_card_pad(f->card, 40), SIM_HIGH);
-    assert_true(get(f, "watchdog.has_bit") == 0);
+    assert_true(servo_get(f, "watchdog.has_bit") == 0);
 }
 
 static void encoder_positions_do_not_jump_when_the_power_fails(void **state)
 {
-    struct fixture *const f = *state;
-    load(f, NULL);
+    struct servo_rig *const f = *state;
+    servo_load(f, NULL);
     assert_int_equal(sim_card_follow(f->card, 0, 0, 4, 1), 0);
-    set(f, "stepgen.00.steplen", 1000);
-    set(f, "stepgen.00.stepspace", 1000);
-    set(f, "stepgen.00.maxaccel", 0);
-    set(f, "stepgen.00.control-type", 1);
-    set(f, "stepgen.00.velocity-cmd", 10000);
-    set(f, "stepgen.00.enable", 1);
-    cycles(f, 500);
-    const double before = get(f, "encoder.00.count");
+    servo_set(f, "stepgen.00.steplen", 1000);
+    servo_set(f, "stepgen.00.stepspace", 1000);
+    servo_set(f, "stepgen.00.maxaccel", 0);
+    servo_set(f, "stepgen.00.control-type", 1);
+    servo_set(f, "stepgen.00.velocity-cmd", 10000);
+    servo_set(f, "stepgen.00.enable", 1);
+    servo_cycles(f, 500);
+    const double before = servo_get(f, "encoder.00.count");
     assert_true(before > 15000);
-    set(f, "stepgen.00.enable", 0);
-    cycles(f, 5);
-    const double at_rest = get(f, "encoder.00.count");
+    servo_set(f, "stepgen.00.enable", 0);
+    servo_cycles(f, 5);
+    const double at_rest = servo_get(f, "encoder.00.count");
     power_cycle(f);
     for (unsigned i = 0; i < 30; i++) {
-        cycle(f);
-        assert_true(get(f, "encoder.00.count") == at_rest);
+        servo_cycle(f);
+        assert_true(servo_get(f, "encoder.00.count") == at_rest);
     }
-    assert_true(get(f, "watchdog.has_bit") == 1);
-    assert_true(get(f, "packet-error") == 0);
+    assert_true(servo_get(f, "watchdog.has_bit") == 1);
+    assert_true(servo_get(f, "packet-error") == 0);
 }
 
 static void a_wait_that_another_program_left_on_the_card_does_not_hold_set_up_up(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     uint8_t request[64];
     struct lbp16_builder builder;
     const uint16_t longest = UINT16_MAX; /* us, for each scratch word */
@@ -334,7 +238,7 @@ static void a_wait_that_another_program_left_on_the_card_does_not_hold_set_up_up
     assert_int_equal(lbp16_add_write16(&builder, LBP16_SPACE_TIMER, LBP16_TIMER_TIMEOUT_US, 1, &longest, NULL), 0);
     assert_int_equal(link_send(f->link, request, builder.used), 0);
     const int64_t begin_ns = link_now_ns(f->link);
-    load(f, NULL);
+    servo_load(f, NULL);
     assert_in_range(link_now_ns(f->link) - begin_ns, 1, 50000000);
 }
 
@@ -342,26 +246,26 @@ static void a_wait_that_another_program_left_on_the_card_does_not_hold_set_up_up
  */
 
 /* datagrams: that a cycle sends. */
-static void count_cost(struct fixture *const f, const char *const config, const unsigned datagrams)
+static void count_cost(struct servo_rig *const f, const char *const config, const unsigned datagrams)
 {
     enum { CYCLES = 5000 };
-    load(f, config);
-    set(f, "stepgen.00.enable", 1);
-    set(f, "stepgen.00.maxaccel", 100);
-    set(f, "pwmgen.00.enable", 1);
-    cycles(f, 600); /* the DPLL sends its set-up for a while, and a pipelined cycle begins */
+    servo_load(f, config);
+    servo_set(f, "stepgen.00.enable", 1);
+    servo_set(f, "stepgen.00.maxaccel", 100);
+    servo_set(f, "pwmgen.00.enable", 1);
+    servo_cycles(f, 600); /* the DPLL sends its set-up for a while, and a pipelined cycle begins */
     const struct link_counters before = f->link->counters;
     const unsigned long allocated = allocations;
     for (unsigned i = 0; i < CYCLES; i++) {
-        set(f, "stepgen.00.position-cmd", i * 0.001);
-        set(f, "pwmgen.00.value", i * 0.0001);
-        cycle(f);
+        servo_set(f, "stepgen.00.position-cmd", i * 0.001);
+        servo_set(f, "pwmgen.00.value", i * 0.0001);
+        servo_cycle(f);
     }
     assert_int_equal(f->link->counters.sent - before.sent, datagrams * CYCLES);
     assert_int_equal(f->link->counters.received - before.received, CYCLES);
     assert_int_equal(allocations, allocated);
     assert_true(!COUNTS_ALLOCATIONS || allocated > 0);
-    assert_true(get(f, "packet-error-total") == 0);
+    assert_true(servo_get(f, "packet-error-total") == 0);
 }
 
 static void a_cycle_allocates_nothing_and_moves_exactly_its_packets(void **state)
@@ -374,7 +278,7 @@ static void so_does_a_pipelined_one(void **state)
     count_cost(*state, "pipelined=4", 1);
 }
 
-#define TEST(function) cmocka_unit_test_setup_teardown(function, set_up, tear_down)
+#define TEST(function) cmocka_unit_test_setup_teardown(function, servo_set_up, servo_tear_down)
 
 int main(void)
 {

@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Smart serial from pin to remote: a board on a simulated 7I96S with a 7I77 at its expansion connector. */
-#include "unit.h"
+#include "servo_rig.h"
 
 #include <math.h>
 
-#include <hm2/board.h>
 #include <hm2/lbp_remote.h>
-#include <hm2/sim.h>
 #include <hm2/sslbp.h>
 
 #include "idrom_files.h"
@@ -14,36 +12,12 @@
 #include "remote_state.h"
 #include "sserial.h"
 
-#define PERIOD_NS 1000000
-#define PREFIX    "hm2_7i96s.0."
-#define FIELD_IO  0u
-#define ANALOG    1u
+#define FIELD_IO 0u
+#define ANALOG   1u
 
-struct fixture {
-    struct sim_card *card;
-    struct sim_net *net;
-    struct link *link;
-    struct hm2_board *board;
-    struct hm2_plain_binder *plain;
-    struct hm2_diag diag;
-};
-
-/* image: of other firmware, or NULL. */
 static int set_up_card(void **const state, const struct hm2_image *const image)
 {
-    struct fixture *const f = calloc(1, sizeof *f);
-    assert_non_null(f);
-    const struct sim_card_options options = {.profile = "7i96s_7i77d", .seed = 1, .image = image};
-    if (sim_card_new(&f->card, &options, &f->diag) != 0)
-        fail_msg("%s", f->diag.text);
-    assert_int_equal(sim_net_new(&f->net, f->card, NULL), 0);
-    f->link = sim_net_link(f->net);
-    f->board = hm2_board_new();
-    f->plain = hm2_plain_binder_new();
-    assert_non_null(f->board);
-    assert_non_null(f->plain);
-    *state = f;
-    return 0;
+    return servo_set_up_card(state, &(struct sim_card_options){.profile = "7i96s_7i77d", .seed = 1, .image = image});
 }
 
 static int set_up(void **state)
@@ -58,108 +32,40 @@ static int set_up_sserialb(void **state)
     return set_up_card(state, &image);
 }
 
-static int tear_down(void **state)
-{
-    struct fixture *const f = *state;
-    hm2_board_free(f->board);
-    hm2_plain_binder_free(f->plain);
-    sim_net_free(f->net);
-    sim_card_free(f->card);
-    free(f);
-    return 0;
-}
-
-static void plug_card(struct fixture *const f, const char *const name)
+static void plug_card(struct servo_rig *const f, const char *const name)
 {
     if (sim_sserial_plug(f->card, 0, FIELD_IO, name, 0x123456, &f->diag) != 0)
         fail_msg("%s", f->diag.text);
 }
 
-static void plug(struct fixture *const f)
+static void plug(struct servo_rig *const f)
 {
     plug_card(f, "7i77");
 }
 
-static int try_load(struct fixture *const f, const char *const config)
+static void run(struct servo_rig *const f)
 {
-    int err = hm2_board_identify(f->board, f->link, &f->diag);
-    if (err == 0)
-        err = hm2_board_setup(f->board, 0, hm2_plain_binder(f->plain), config, &f->diag);
-    return err == 0 ? hm2_board_start(f->board, &f->diag) : err;
+    for (unsigned i = 0; i < 200 && servo_get(f, "sserial.port-0.port_state") != SSLBP_RUNNING; i++)
+        servo_cycle(f);
+    assert_int_equal(servo_get(f, "sserial.port-0.port_state"), SSLBP_RUNNING);
+    servo_cycles(f, 3);
 }
 
-static void load(struct fixture *const f, const char *const config)
-{
-    if (try_load(f, config) != 0)
-        fail_msg("%s", f->diag.text);
-}
-
-static double get(const struct fixture *const f, const char *const name)
-{
-    char full[128];
-    int err;
-    (void)snprintf(full, sizeof full, PREFIX "%s", name);
-    const double value = hm2_plain_get(f->plain, full, &err);
-    if (err)
-        fail_msg("no point %s", full);
-    return value;
-}
-
-static void set(const struct fixture *const f, const char *const name, const double value)
-{
-    char full[128];
-    (void)snprintf(full, sizeof full, PREFIX "%s", name);
-    if (hm2_plain_set(f->plain, full, value) != 0)
-        fail_msg("no point %s", full);
-}
-
-static void cycle(struct fixture *const f)
-{
-    const int64_t begin_ns = link_now_ns(f->link);
-    hm2_board_read(f->board, PERIOD_NS);
-    hm2_board_write(f->board, PERIOD_NS);
-    sim_net_sleep_until(f->net, begin_ns + PERIOD_NS);
-}
-
-static void cycles(struct fixture *const f, const unsigned count)
-{
-    for (unsigned i = 0; i < count; i++)
-        cycle(f);
-}
-
-static void run(struct fixture *const f)
-{
-    for (unsigned i = 0; i < 200 && get(f, "sserial.port-0.port_state") != SSLBP_RUNNING; i++)
-        cycle(f);
-    assert_int_equal(get(f, "sserial.port-0.port_state"), SSLBP_RUNNING);
-    cycles(f, 3);
-}
-
-static bool message(const struct fixture *const f, const char *const words)
-{
-    char text[1024];
-    bool error;
-    while (hm2_board_next_message(f->board, text, sizeof text, &error) > 0)
-        if (strstr(text, words))
-            return true;
-    return false;
-}
-
-static struct remote *remote(const struct fixture *const f, const unsigned channel)
+static struct remote *remote(const struct servo_rig *const f, const unsigned channel)
 {
     struct remote *const found = sim_sserial_remote(f->card, 0, channel);
     assert_non_null(found);
     return found;
 }
 
-static double at_remote(const struct fixture *const f, const unsigned channel, const char *const field)
+static double at_remote(const struct servo_rig *const f, const unsigned channel, const char *const field)
 {
     double value;
     assert_int_equal(remote_get(remote(f, channel), field, &value), 0);
     return value;
 }
 
-static unsigned parameter(const struct fixture *const f, const unsigned channel, const uint16_t address)
+static unsigned parameter(const struct servo_rig *const f, const unsigned channel, const uint16_t address)
 {
     struct remote *const r = remote(f, channel);
     remote_set_nv_access(r, address >= REMOTE_AT_NV);
@@ -173,7 +79,7 @@ static unsigned parameter(const struct fixture *const f, const unsigned channel,
 
 static void discovery_makes_the_points_of_both_processors(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     static const struct {
         const char *name;
         enum hm2_point_type type;
@@ -203,7 +109,7 @@ static void discovery_makes_the_points_of_both_processors(void **state)
         {"7i77.0.1.analogena-invert", HM2_BIT, HM2_PARAM_RW, 0},
     };
     plug(f);
-    load(f, "sserial_port_0=30xxxxxx");
+    servo_load(f, "sserial_port_0=30xxxxxx");
     assert_string_equal(f->diag.text, "");
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         char full[128];
@@ -211,16 +117,16 @@ static void discovery_makes_the_points_of_both_processors(void **state)
         const struct hm2_plain_object *const object = hm2_plain_find(f->plain, full);
         if (!object || object->point->type != rows[i].type || object->point->dir != rows[i].dir)
             fail_msg("%s: %s", full, object ? "another type or direction" : "missing");
-        if (fabs(get(f, rows[i].name) - rows[i].value) > 1e-12)
-            fail_msg("%s is %.17g", full, get(f, rows[i].name));
+        if (fabs(servo_get(f, rows[i].name) - rows[i].value) > 1e-12)
+            fail_msg("%s is %.17g", full, servo_get(f, rows[i].name));
     }
 }
 
 static void a_mode_decides_which_points_there_are(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=00xxxxxx");
+    servo_load(f, "sserial_port_0=00xxxxxx");
     assert_non_null(hm2_plain_find(f->plain, PREFIX "7i77.0.0.input-00"));
     assert_null(hm2_plain_find(f->plain, PREFIX "7i77.0.0.analogin0"));
     assert_null(hm2_plain_find(f->plain, PREFIX "7i77.0.0.enc0.count"));
@@ -228,8 +134,8 @@ static void a_mode_decides_which_points_there_are(void **state)
 
 static void a_remote_that_is_missing_in_its_mode_is_an_error_with_what_was_seen(void **state)
 {
-    struct fixture *const f = *state;
-    assert_int_equal(try_load(f, "sserial_port_0=x2xxxxxx"), HM2_ERR_NOTFOUND);
+    struct servo_rig *const f = *state;
+    assert_int_equal(servo_try_load(f, "sserial_port_0=x2xxxxxx"), HM2_ERR_NOTFOUND);
     assert_non_null(strstr(f->diag.text, "smart-serial port 0, channel 1: config sserial_port_0 expects a remote in "
                                          "mode 2, none found"));
     assert_non_null(strstr(f->diag.text, "no remote answers"));
@@ -237,8 +143,8 @@ static void a_remote_that_is_missing_in_its_mode_is_an_error_with_what_was_seen(
 
 static void an_empty_channel_of_mode_0_is_a_warning_and_its_pins_are_gpio(void **state)
 {
-    struct fixture *const f = *state;
-    load(f, "sserial_port_0=0xxxxxxx");
+    struct servo_rig *const f = *state;
+    servo_load(f, "sserial_port_0=0xxxxxxx");
     assert_non_null(strstr(f->diag.text, "warning: hm2_7i96s.0: smart-serial port 0, channel 0: config sserial_port_0 "
                                          "expects a remote in mode 0, none found"));
     assert_null(hm2_plain_find(f->plain, PREFIX "sserial.port-0.run"));
@@ -246,17 +152,17 @@ static void an_empty_channel_of_mode_0_is_a_warning_and_its_pins_are_gpio(void *
 
 static void channels_that_nobody_asked_for_are_passed_over_in_silence(void **state)
 {
-    struct fixture *const f = *state;
-    load(f, "");
+    struct servo_rig *const f = *state;
+    servo_load(f, "");
     assert_string_equal(f->diag.text, "");
     assert_null(hm2_plain_find(f->plain, PREFIX "sserial.port-0.run"));
 }
 
 static void serial_numbers_name_remotes_on_request(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=0xxxxxxx use_serial_numbers");
+    servo_load(f, "sserial_port_0=0xxxxxxx use_serial_numbers");
     assert_non_null(hm2_plain_find(f->plain, "hm2_7i77.3456.input-00"));
 }
 
@@ -265,94 +171,94 @@ static void serial_numbers_name_remotes_on_request(void **state)
 
 static void values_go_both_ways(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=30xxxxxx");
+    servo_load(f, "sserial_port_0=30xxxxxx");
     run(f);
-    set(f, "7i77.0.0.output-03", 1);
-    set(f, "7i77.0.0.output-15-invert", 1);
-    set(f, "7i77.0.1.analogout0", 5);
-    set(f, "7i77.0.1.analogout5", -20); /* beyond its limit */
-    set(f, "7i77.0.1.analogena", 1);
+    servo_set(f, "7i77.0.0.output-03", 1);
+    servo_set(f, "7i77.0.0.output-15-invert", 1);
+    servo_set(f, "7i77.0.1.analogout0", 5);
+    servo_set(f, "7i77.0.1.analogout5", -20); /* beyond its limit */
+    servo_set(f, "7i77.0.1.analogena", 1);
     assert_int_equal(remote_set(remote(f, FIELD_IO), "Input", 0x80000005), 0);
     assert_int_equal(remote_set(remote(f, FIELD_IO), "AnalogIn2", 12), 0);
-    cycles(f, 4);
+    servo_cycles(f, 4);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 0x8008);
     assert_true(fabs(at_remote(f, ANALOG, "AnalogOut0") - 5) < 0.003);
     assert_true(fabs(at_remote(f, ANALOG, "AnalogOut5") + 10) < 0.003);
     assert_int_equal(at_remote(f, ANALOG, "AnalogEna"), 1);
-    assert_int_equal(get(f, "7i77.0.0.input-00"), 1);
-    assert_int_equal(get(f, "7i77.0.0.input-01-not"), 1);
-    assert_int_equal(get(f, "7i77.0.0.input-31"), 1);
-    assert_true(fabs(get(f, "7i77.0.0.analogin2") - 12) < 0.15);
-    assert_int_equal(get(f, "7i77.0.0.link-fault"), 0);
-    assert_int_equal(get(f, "sserial.port-0.fault"), 0);
-    assert_int_equal(get(f, "sserial.port-0.doits-skipped"), 0);
-    assert_true(get(f, "sserial.port-0.doit-us") > 100 && get(f, "sserial.port-0.doit-us") < 1000);
+    assert_int_equal(servo_get(f, "7i77.0.0.input-00"), 1);
+    assert_int_equal(servo_get(f, "7i77.0.0.input-01-not"), 1);
+    assert_int_equal(servo_get(f, "7i77.0.0.input-31"), 1);
+    assert_true(fabs(servo_get(f, "7i77.0.0.analogin2") - 12) < 0.15);
+    assert_int_equal(servo_get(f, "7i77.0.0.link-fault"), 0);
+    assert_int_equal(servo_get(f, "sserial.port-0.fault"), 0);
+    assert_int_equal(servo_get(f, "sserial.port-0.doits-skipped"), 0);
+    assert_true(servo_get(f, "sserial.port-0.doit-us") > 100 && servo_get(f, "sserial.port-0.doit-us") < 1000);
 }
 
 static void a_counter_accumulates_past_its_width(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=3xxxxxxx");
+    servo_load(f, "sserial_port_0=3xxxxxxx");
     run(f);
     for (unsigned i = 1; i <= 1000; i++) {
         assert_int_equal(remote_set(remote(f, FIELD_IO), "Enc0", i % 256u), 0);
-        cycle(f);
+        servo_cycle(f);
     }
-    cycles(f, 2);
-    assert_int_equal(get(f, "7i77.0.0.enc0.count"), 1000);
-    set(f, "7i77.0.0.enc0.reset", 1);
-    cycle(f);
-    set(f, "7i77.0.0.enc0.reset", 0);
-    assert_int_equal(get(f, "7i77.0.0.enc0.count"), 0);
-    assert_int_equal(get(f, "7i77.0.0.enc0.rawcounts"), 1000);
-    set(f, "7i77.0.0.enc0.index-enable", 1);
+    servo_cycles(f, 2);
+    assert_int_equal(servo_get(f, "7i77.0.0.enc0.count"), 1000);
+    servo_set(f, "7i77.0.0.enc0.reset", 1);
+    servo_cycle(f);
+    servo_set(f, "7i77.0.0.enc0.reset", 0);
+    assert_int_equal(servo_get(f, "7i77.0.0.enc0.count"), 0);
+    assert_int_equal(servo_get(f, "7i77.0.0.enc0.rawcounts"), 1000);
+    servo_set(f, "7i77.0.0.enc0.index-enable", 1);
     for (unsigned i = 1001; i <= 1100; i++) {
         assert_int_equal(remote_set(remote(f, FIELD_IO), "Enc0", i % 256u), 0);
-        cycle(f);
+        servo_cycle(f);
     }
-    cycles(f, 2);
-    assert_int_equal(get(f, "7i77.0.0.enc0.index-enable"), 0);
-    assert_int_equal(get(f, "7i77.0.0.enc0.count"), 1100 - 1024);
+    servo_cycles(f, 2);
+    assert_int_equal(servo_get(f, "7i77.0.0.enc0.index-enable"), 0);
+    assert_int_equal(servo_get(f, "7i77.0.0.enc0.count"), 1100 - 1024);
 }
 
 static void run_stops_and_starts_the_port(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=00xxxxxx");
+    servo_load(f, "sserial_port_0=00xxxxxx");
     run(f);
-    set(f, "7i77.0.0.output-00", 1);
-    cycles(f, 3);
+    servo_set(f, "7i77.0.0.output-00", 1);
+    servo_cycles(f, 3);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 1);
-    set(f, "sserial.port-0.run", 0);
-    cycles(f, 100);
-    assert_int_equal(get(f, "sserial.port-0.port_state"), SSLBP_IDLE);
+    servo_set(f, "sserial.port-0.run", 0);
+    servo_cycles(f, 100);
+    assert_int_equal(servo_get(f, "sserial.port-0.port_state"), SSLBP_IDLE);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 0);
-    set(f, "sserial.port-0.run", 1);
+    servo_set(f, "sserial.port-0.run", 1);
     run(f);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 1);
 }
 
 static void a_changed_parameter_is_written_when_the_port_starts_again(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=00xxxxxx");
+    servo_load(f, "sserial_port_0=00xxxxxx");
     run(f);
-    set(f, "7i77.0.0.nvwatchdogtimeout", 80);
-    set(f, "7i77.0.1.watchdogtimeout", 70);
-    cycles(f, 10);
+    servo_set(f, "7i77.0.0.nvwatchdogtimeout", 80);
+    servo_set(f, "7i77.0.1.watchdogtimeout", 70);
+    servo_cycles(f, 10);
     assert_int_equal(parameter(f, ANALOG, REMOTE_AT_WATCHDOG), 50);
-    set(f, "sserial.port-0.run", 0);
-    cycles(f, 10);
-    set(f, "sserial.port-0.run", 1);
+    servo_set(f, "sserial.port-0.run", 0);
+    servo_cycles(f, 10);
+    servo_set(f, "sserial.port-0.run", 1);
     run(f);
     assert_int_equal(parameter(f, FIELD_IO, REMOTE_AT_NV_WATCHDOG), 80);
     assert_int_equal(parameter(f, ANALOG, REMOTE_AT_WATCHDOG), 70);
-    assert_false(message(f, "did not take"));
+    assert_false(servo_message(f, "did not take"));
 }
 
 /* ---- other remotes, other firmware ----------------------------------------------------------------------------------
@@ -360,74 +266,74 @@ static void a_changed_parameter_is_written_when_the_port_starts_again(void **sta
 
 static void fields_of_48_bits_go_both_ways_beside_counters(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug_card(f, "7i69");
-    load(f, "sserial_port_0=4xxxxxxx");
+    servo_load(f, "sserial_port_0=4xxxxxxx");
     run(f);
-    set(f, "7i69.0.0.output-00", 1);
-    set(f, "7i69.0.0.output-33", 1);
-    set(f, "7i69.0.0.output-47", 1);
+    servo_set(f, "7i69.0.0.output-00", 1);
+    servo_set(f, "7i69.0.0.output-33", 1);
+    servo_set(f, "7i69.0.0.output-47", 1);
     assert_int_equal(remote_set(remote(f, 0), "Input", (double)(UINT64_C(1) << 47 | UINT64_C(1) << 32 | 1)), 0);
     assert_int_equal(remote_set(remote(f, 0), "Enc3", 5), 0);
-    cycles(f, 4);
+    servo_cycles(f, 4);
     assert_true(at_remote(f, 0, "Output") == (double)(UINT64_C(1) << 47 | UINT64_C(1) << 33 | 1));
-    assert_int_equal(get(f, "7i69.0.0.input-00"), 1);
-    assert_int_equal(get(f, "7i69.0.0.input-31"), 0);
-    assert_int_equal(get(f, "7i69.0.0.input-32"), 1);
-    assert_int_equal(get(f, "7i69.0.0.input-47"), 1);
-    assert_int_equal(get(f, "7i69.0.0.enc3.count"), 5);
+    assert_int_equal(servo_get(f, "7i69.0.0.input-00"), 1);
+    assert_int_equal(servo_get(f, "7i69.0.0.input-31"), 0);
+    assert_int_equal(servo_get(f, "7i69.0.0.input-32"), 1);
+    assert_int_equal(servo_get(f, "7i69.0.0.input-47"), 1);
+    assert_int_equal(servo_get(f, "7i69.0.0.enc3.count"), 5);
 }
 
 static void halves_of_a_48_bit_card_are_its_first_inputs_and_its_last_outputs(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug_card(f, "7i69");
-    load(f, "sserial_port_0=3xxxxxxx");
+    servo_load(f, "sserial_port_0=3xxxxxxx");
     run(f);
     assert_null(hm2_plain_find(f->plain, "hm2_7i96s.0.7i69.0.0.input-24"));
-    set(f, "7i69.0.0.output-23", 1);
+    servo_set(f, "7i69.0.0.output-23", 1);
     assert_int_equal(remote_set(remote(f, 0), "Input", 1 << 23), 0);
-    cycles(f, 4);
+    servo_cycles(f, 4);
     assert_int_equal(remote_terminal(remote(f, 0), 47), SIM_HIGH);
     assert_int_equal(remote_terminal(remote(f, 0), 23), SIM_FLOAT);
-    assert_int_equal(get(f, "7i69.0.0.input-23"), 1);
+    assert_int_equal(servo_get(f, "7i69.0.0.input-23"), 1);
 }
 
 static void streams_are_carried_as_they_are(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug_card(f, "7i73");
-    load(f, "sserial_port_0=2xxxxxxx");
+    servo_load(f, "sserial_port_0=2xxxxxxx");
     run(f);
-    set(f, "7i73.0.0.display", 0xA5);
-    set(f, "7i73.0.0.display32", 0xDEADBEEF);
+    servo_set(f, "7i73.0.0.display", 0xA5);
+    servo_set(f, "7i73.0.0.display32", 0xDEADBEEF);
     assert_int_equal(remote_set(remote(f, 0), "KeyCode", 0x81), 0);
-    cycles(f, 4);
+    servo_cycles(f, 4);
     assert_int_equal(at_remote(f, 0, "Display"), 0xA5);
     assert_true(at_remote(f, 0, "Display32") == (double)0xDEADBEEF);
-    assert_int_equal(get(f, "7i73.0.0.keycode"), 0x81);
+    assert_int_equal(servo_get(f, "7i73.0.0.keycode"), 0x81);
 }
 
 static void sserialb_drives_the_same_remotes(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=300xxxxx");
+    servo_load(f, "sserial_port_0=300xxxxx");
     assert_non_null(strstr(f->diag.text, "channel 2: config sserial_port_0 expects a remote in mode 0, none found"));
     run(f);
-    set(f, "7i77.0.0.output-15", 1);
-    set(f, "7i77.0.1.analogout5", -10);
+    servo_set(f, "7i77.0.0.output-15", 1);
+    servo_set(f, "7i77.0.1.analogout5", -10);
     assert_int_equal(remote_set(remote(f, FIELD_IO), "Input", 0x80000000), 0);
     assert_int_equal(remote_set(remote(f, FIELD_IO), "Enc1", 7), 0);
-    cycles(f, 4);
+    servo_cycles(f, 4);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 0x8000);
     assert_true(fabs(at_remote(f, ANALOG, "AnalogOut5") + 10) < 0.003);
-    assert_int_equal(get(f, "7i77.0.0.input-31"), 1);
-    assert_int_equal(get(f, "7i77.0.0.enc1.count"), 7);
+    assert_int_equal(servo_get(f, "7i77.0.0.input-31"), 1);
+    assert_int_equal(servo_get(f, "7i77.0.0.enc1.count"), 7);
     assert_int_equal(sim_sserial_cable(f->card, 0, FIELD_IO, SIM_CABLE_OUT), 0);
-    cycles(f, 3);
-    assert_int_equal(get(f, "7i77.0.0.link-fault"), 1);
-    assert_int_equal(get(f, "7i77.0.1.link-fault"), 0);
+    servo_cycles(f, 3);
+    assert_int_equal(servo_get(f, "7i77.0.0.link-fault"), 1);
+    assert_int_equal(servo_get(f, "7i77.0.1.link-fault"), 0);
 }
 
 /* ---- disturbances --------------------------------------------------------------------------------------------------
@@ -435,110 +341,110 @@ static void sserialb_drives_the_same_remotes(void **state)
 
 static void a_pulled_cable_stops_its_remote_alone_and_is_reported_within_three_cycles(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=00xxxxxx");
+    servo_load(f, "sserial_port_0=00xxxxxx");
     run(f);
-    set(f, "7i77.0.1.analogena", 1);
-    set(f, "7i77.0.1.analogout0", 5);
-    cycles(f, 3);
+    servo_set(f, "7i77.0.1.analogena", 1);
+    servo_set(f, "7i77.0.1.analogout0", 5);
+    servo_cycles(f, 3);
     assert_int_equal(sim_sserial_cable(f->card, 0, FIELD_IO, SIM_CABLE_OUT), 0);
-    cycles(f, 3);
-    assert_int_equal(get(f, "7i77.0.0.link-fault"), 1);
-    assert_int_equal(get(f, "7i77.0.1.link-fault"), 0);
-    cycles(f, 100);
-    assert_true(message(f, "the remote on channel 0 does not answer"));
-    assert_int_equal(get(f, "sserial.port-0.port_state"), SSLBP_RUNNING);
-    assert_int_equal(get(f, "sserial.port-0.fault"), 1);
+    servo_cycles(f, 3);
+    assert_int_equal(servo_get(f, "7i77.0.0.link-fault"), 1);
+    assert_int_equal(servo_get(f, "7i77.0.1.link-fault"), 0);
+    servo_cycles(f, 100);
+    assert_true(servo_message(f, "the remote on channel 0 does not answer"));
+    assert_int_equal(servo_get(f, "sserial.port-0.port_state"), SSLBP_RUNNING);
+    assert_int_equal(servo_get(f, "sserial.port-0.fault"), 1);
     assert_true(fabs(at_remote(f, ANALOG, "AnalogOut0") - 5) < 0.003);
-    assert_int_equal(get(f, "7i77.0.1.link-errors"), 0);
+    assert_int_equal(servo_get(f, "7i77.0.1.link-errors"), 0);
     /* Back in its socket it stays stopped until a person starts the port. */
     assert_int_equal(sim_sserial_cable(f->card, 0, FIELD_IO, SIM_CABLE_IN), 0);
-    set(f, "7i77.0.0.output-00", 1);
-    cycles(f, 200);
-    assert_int_equal(get(f, "7i77.0.0.link-fault"), 1);
+    servo_set(f, "7i77.0.0.output-00", 1);
+    servo_cycles(f, 200);
+    assert_int_equal(servo_get(f, "7i77.0.0.link-fault"), 1);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 0);
-    set(f, "sserial.port-0.run", 0);
-    cycles(f, 3);
-    set(f, "sserial.port-0.run", 1);
+    servo_set(f, "sserial.port-0.run", 0);
+    servo_cycles(f, 3);
+    servo_set(f, "sserial.port-0.run", 1);
     run(f);
-    assert_int_equal(get(f, "sserial.port-0.fault"), 0);
+    assert_int_equal(servo_get(f, "sserial.port-0.fault"), 0);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 1);
 }
 
 static void auto_restart_brings_a_remote_back(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=00xxxxxx");
-    set(f, "sserial.port-0.auto-restart", 1);
+    servo_load(f, "sserial_port_0=00xxxxxx");
+    servo_set(f, "sserial.port-0.auto-restart", 1);
     run(f);
-    set(f, "7i77.0.0.output-00", 1);
+    servo_set(f, "7i77.0.0.output-00", 1);
     assert_int_equal(sim_sserial_cable(f->card, 0, FIELD_IO, SIM_CABLE_OUT), 0);
-    cycles(f, 500);
-    assert_int_equal(get(f, "sserial.port-0.fault"), 1);
+    servo_cycles(f, 500);
+    assert_int_equal(servo_get(f, "sserial.port-0.fault"), 1);
     assert_int_equal(sim_sserial_cable(f->card, 0, FIELD_IO, SIM_CABLE_IN), 0);
-    cycles(f, 500);
-    assert_int_equal(get(f, "sserial.port-0.fault"), 0);
-    assert_int_equal(get(f, "sserial.port-0.restarts"), 1);
+    servo_cycles(f, 500);
+    assert_int_equal(servo_get(f, "sserial.port-0.fault"), 0);
+    assert_int_equal(servo_get(f, "sserial.port-0.restarts"), 1);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 1);
 }
 
 static void a_port_without_remotes_left_is_in_error_until_run_changes(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=0xxxxxxx");
+    servo_load(f, "sserial_port_0=0xxxxxxx");
     run(f);
     assert_int_equal(sim_sserial_cable(f->card, 0, FIELD_IO, SIM_CABLE_OUT), 0);
-    cycles(f, 100);
-    assert_int_equal(get(f, "sserial.port-0.port_state"), SSLBP_ERROR);
-    assert_true(message(f, "the port is stopped"));
+    servo_cycles(f, 100);
+    assert_int_equal(servo_get(f, "sserial.port-0.port_state"), SSLBP_ERROR);
+    assert_true(servo_message(f, "the port is stopped"));
     assert_int_equal(sim_sserial_cable(f->card, 0, FIELD_IO, SIM_CABLE_IN), 0);
-    cycles(f, 1000);
-    assert_int_equal(get(f, "sserial.port-0.port_state"), SSLBP_ERROR);
-    set(f, "sserial.port-0.run", 0);
-    cycles(f, 3);
-    set(f, "sserial.port-0.run", 1);
+    servo_cycles(f, 1000);
+    assert_int_equal(servo_get(f, "sserial.port-0.port_state"), SSLBP_ERROR);
+    servo_set(f, "sserial.port-0.run", 0);
+    servo_cycles(f, 3);
+    servo_set(f, "sserial.port-0.run", 1);
     run(f);
 }
 
 static void a_restarted_card_starts_its_remotes_again(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=00xxxxxx");
+    servo_load(f, "sserial_port_0=00xxxxxx");
     run(f);
-    set(f, "7i77.0.0.output-00", 1);
-    cycles(f, 3);
+    servo_set(f, "7i77.0.0.output-00", 1);
+    servo_cycles(f, 3);
     sim_card_power_cycle(f->card);
-    for (unsigned i = 0; i < 2000 && get(f, "watchdog.has_bit") == 0.0; i++) {
-        cycle(f);
-        set(f, "io_error", 0);
+    for (unsigned i = 0; i < 2000 && servo_get(f, "watchdog.has_bit") == 0.0; i++) {
+        servo_cycle(f);
+        servo_set(f, "io_error", 0);
     }
-    cycles(f, 100);
-    assert_int_equal(get(f, "sserial.port-0.port_state"), SSLBP_IDLE);
+    servo_cycles(f, 100);
+    assert_int_equal(servo_get(f, "sserial.port-0.port_state"), SSLBP_IDLE);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 0);
-    set(f, "watchdog.has_bit", 0);
+    servo_set(f, "watchdog.has_bit", 0);
     run(f);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 1);
-    assert_int_equal(get(f, "sserial.port-0.fault"), 0);
+    assert_int_equal(servo_get(f, "sserial.port-0.fault"), 0);
 }
 
 static void after_a_bite_of_the_watchdog_the_port_starts_again(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "sserial_port_0=00xxxxxx");
+    servo_load(f, "sserial_port_0=00xxxxxx");
     run(f);
-    set(f, "7i77.0.0.output-00", 1);
-    cycles(f, 3);
+    servo_set(f, "7i77.0.0.output-00", 1);
+    servo_cycles(f, 3);
     sim_net_sleep_until(f->net, link_now_ns(f->link) + INT64_C(200000000));
-    cycles(f, 5);
-    assert_int_equal(get(f, "watchdog.has_bit"), 1);
+    servo_cycles(f, 5);
+    assert_int_equal(servo_get(f, "watchdog.has_bit"), 1);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 0);
-    assert_int_equal(get(f, "sserial.port-0.port_state"), SSLBP_IDLE);
-    set(f, "watchdog.has_bit", 0);
+    assert_int_equal(servo_get(f, "sserial.port-0.port_state"), SSLBP_IDLE);
+    servo_set(f, "watchdog.has_bit", 0);
     run(f);
     assert_int_equal(at_remote(f, FIELD_IO, "Output"), 1);
 }
@@ -548,7 +454,7 @@ static void after_a_bite_of_the_watchdog_the_port_starts_again(void **state)
 
 static void firmware_goes_through_a_card_into_the_flash_of_the_remote(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     static const uint8_t modes[SSLBP_CHANNELS];
     static uint8_t image[5 << REMOTE_BLOCK_LOG2];
     struct sslbp_port port;
@@ -598,7 +504,7 @@ struct long_run {
     unsigned fresh, failed;
 };
 
-static void *value_of(const struct fixture *const f, const char *const name)
+static void *value_of(const struct servo_rig *const f, const char *const name)
 {
     const struct hm2_plain_object *const object = hm2_plain_find(f->plain, name);
     if (!object)
@@ -606,7 +512,7 @@ static void *value_of(const struct fixture *const f, const char *const name)
     return object->value;
 }
 
-static void find_points(const struct fixture *const f, struct long_run *const r)
+static void find_points(const struct servo_rig *const f, struct long_run *const r)
 {
     char name[64];
     for (unsigned i = 0; i < INPUTS; i++) {
@@ -633,7 +539,7 @@ static uint32_t shown_input(const struct long_run *const r)
 }
 
 /* Errors of all kinds, seldom more than a few in a row. */
-static void disturb(const struct fixture *const f, struct random *const random)
+static void disturb(const struct servo_rig *const f, struct random *const random)
 {
     static const char *const errors[] = {"crc", "overrun", "timeout", "extra", "break"};
     if (random_below(random, 20) == 0)
@@ -669,14 +575,14 @@ static void check_output(struct long_run *const r, const uint32_t number)
 
 static void many_cycles_with_errors_on_both_lines_show_nothing_stale_and_drive_no_glitch(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     struct random random = {1};
     const char *const wanted = getenv("HM2_LONG_CYCLES");
     const uint32_t count = wanted ? (uint32_t)strtoul(wanted, NULL, 10) : SHORT_CYCLES;
     struct long_run r = {.shown = 0};
     plug(f);
-    load(f, "sserial_port_0=00xxxxxx");
-    set(f, "packet-error-limit", 1000);
+    servo_load(f, "sserial_port_0=00xxxxxx");
+    servo_set(f, "packet-error-limit", 1000);
     run(f);
     assert_int_equal(sim_net_set_faults(f->net, &(struct sim_faults){.seed = 1, .loss = 0.002, .duplicate = 0.002}), 0);
     find_points(f, &r);
@@ -696,25 +602,25 @@ static void many_cycles_with_errors_on_both_lines_show_nothing_stale_and_drive_n
         sim_net_sleep_until(f->net, begin_ns + PERIOD_NS);
     }
     assert_true(r.failed > count / 50 && r.fresh > count / 2);
-    assert_int_equal(get(f, "sserial.port-0.port_state"), SSLBP_RUNNING);
+    assert_int_equal(servo_get(f, "sserial.port-0.port_state"), SSLBP_RUNNING);
 }
 
 /* A read that comes too early would be a fault of the port. */
 static void a_card_with_remotes_keeps_plain_cycles(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     plug(f);
-    load(f, "pipelined=4");
+    servo_load(f, "pipelined=4");
     assert_non_null(strstr(f->diag.text, "pipelined=4 has no effect: smart-serial remotes"));
-    cycles(f, 1000);
-    assert_true(get(f, "pipeline.active") == 0);
-    assert_true(get(f, "sserial.port-0.fault-count") == 0);
-    assert_true(get(f, "packet-error-total") == 0);
+    servo_cycles(f, 1000);
+    assert_true(servo_get(f, "pipeline.active") == 0);
+    assert_true(servo_get(f, "sserial.port-0.fault-count") == 0);
+    assert_true(servo_get(f, "packet-error-total") == 0);
 }
 
 int main(void)
 {
-#define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+#define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, servo_tear_down)
     const struct CMUnitTest tests[] = {
         TEST(discovery_makes_the_points_of_both_processors),
         TEST(a_card_with_remotes_keeps_plain_cycles),
@@ -730,7 +636,7 @@ int main(void)
         TEST(fields_of_48_bits_go_both_ways_beside_counters),
         TEST(halves_of_a_48_bit_card_are_its_first_inputs_and_its_last_outputs),
         TEST(streams_are_carried_as_they_are),
-        cmocka_unit_test_setup_teardown(sserialb_drives_the_same_remotes, set_up_sserialb, tear_down),
+        cmocka_unit_test_setup_teardown(sserialb_drives_the_same_remotes, set_up_sserialb, servo_tear_down),
         TEST(a_pulled_cable_stops_its_remote_alone_and_is_reported_within_three_cycles),
         TEST(auto_restart_brings_a_remote_back),
         TEST(a_port_without_remotes_left_is_in_error_until_run_changes),
