@@ -14,10 +14,10 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "linuxcnc_peer.h"
 #include "simulator.h"
 
 #define PEER_LIMIT_MS 110000
-#define CANNOT_RUN    77
 #define MAX_SAMPLES   30000u
 #define CATCH_UP      1000u /* cycles; the first command is a jump of speed */
 
@@ -52,26 +52,21 @@ static char out[256];
 /* ---- running ------------------------------------------------------------------------------------------------------
  */
 
-static void set(const char *const name, const char *const value)
-{
-    ck_assert_int_eq(setenv(name, value, 1), 0);
-}
-
 static void start_peer(const struct peer *const peer)
 {
     char text[64];
     snprintf(out, sizeof out, "%s/peer-%s-%s", TEST_BUILD, peer->driver, peer->card);
     ck_assert(mkdir(out, 0755) == 0 || errno == EEXIST);
-    set("PEER_DRIVER", peer->driver);
-    set("PEER_CONFIG", peer->config);
+    linuxcnc_tell("PEER_DRIVER", peer->driver);
+    linuxcnc_tell("PEER_CONFIG", peer->config);
     snprintf(text, sizeof text, "hm2_%s.0", peer->card);
-    set("PEER_CARD", text);
+    linuxcnc_tell("PEER_CARD", text);
     snprintf(text, sizeof text, "%u", peer->samples);
-    set("PEER_SAMPLES", text);
+    linuxcnc_tell("PEER_SAMPLES", text);
     snprintf(text, sizeof text, "%d", (int)getpid());
-    set("PEER_MARK", text);
+    linuxcnc_tell("PEER_MARK", text);
     if (peer->driver[4] == 'l')
-        set("PEER_MODULES", TEST_BUILD "/linuxcnc");
+        linuxcnc_tell("PEER_MODULES", TEST_BUILD "/linuxcnc");
     const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer",  TEST_BUILD, out,   peer->card,
                                 TEST_SOURCE "/tests/system/hal/follow.hal", "--follow", "0:0", NULL};
     process_start(&run, argv);
@@ -88,16 +83,13 @@ static void give_up(const char *const what)
 /* False when this machine cannot run it, which was said then. */
 static bool run_peer(const struct peer *const peer)
 {
-    const char *skip;
     start_peer(peer);
     if (!process_wait_end(&run, PEER_LIMIT_MS)) {
         process_stop(&run, SIGKILL, 0);
         give_up("no end in time");
     }
-    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
-        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
+    if (linuxcnc_skipped(&run))
         return false;
-    }
     if (run.status != 0)
         give_up("an exit status that is not 0");
     return true;
@@ -255,14 +247,8 @@ END_TEST
 START_TEST(our_component_runs_in_linuxcnc_with_the_same_hal_file)
 {
     const struct peer *const peer = &ours[_i];
-    if (TEST_SANITIZED) {
-        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+    if (!linuxcnc_loads_ours())
         return;
-    }
-    if (access(TEST_BUILD "/linuxcnc/hm2_lbp16.so", R_OK) != 0) {
-        printf("SKIP: LinuxCNC's headers are not installed (linuxcnc-uspace-dev)\n");
-        return;
-    }
     if (!run_peer(peer))
         return;
     check_run(peer);

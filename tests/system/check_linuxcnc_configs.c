@@ -13,10 +13,10 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "linuxcnc_peer.h"
 #include "process.h"
 
 #define LIMIT_MS        100000
-#define CANNOT_RUN      77
 #define JOINTS          3u
 #define PARTS_OF_A_STEP 65536.0 /* position registers of step generators (register map 3.4) */
 
@@ -85,7 +85,6 @@ static void give_up(const char *const what)
 static bool run_config(const struct config *const config)
 {
     char out[256];
-    const char *skip;
     snprintf(out, sizeof out, "%s/config-%s", TEST_BUILD, config->name);
     const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-config", TEST_BUILD, out, config->name, NULL};
     process_start(&run, argv);
@@ -93,10 +92,8 @@ static bool run_config(const struct config *const config)
         process_stop(&run, SIGKILL, 0);
         give_up("no end in time");
     }
-    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
-        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
+    if (linuxcnc_skipped(&run))
         return false;
-    }
     if (run.status != 0)
         give_up("an exit status that is not 0");
     return true;
@@ -226,14 +223,8 @@ static void check_card_was_there(const struct config *const config)
 START_TEST(a_configuration_of_others_homes_and_ends_where_its_program_says)
 {
     const struct config *const config = &configs[_i];
-    if (TEST_SANITIZED) {
-        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+    if (!linuxcnc_loads_ours())
         return;
-    }
-    if (access(TEST_BUILD "/linuxcnc/hm2_lbp16.so", R_OK) != 0) {
-        printf("SKIP: LinuxCNC's headers are not installed (linuxcnc-uspace-dev)\n");
-        return;
-    }
     if (!run_config(config))
         return;
     check_only_the_load_lines_differ();

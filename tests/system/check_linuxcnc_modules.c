@@ -13,24 +13,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "linuxcnc_peer.h"
 #include "process.h"
 
 #define RUN_LIMIT_MS  60000
 #define LOAD_LIMIT_MS 100000
-#define CANNOT_RUN    77
 #define DATA          TEST_DATA "/linuxcnc"
-
-#if defined __has_feature
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define SANITIZED 1
-#endif
-#endif
-#if defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__
-#define SANITIZED 1
-#endif
-#ifndef SANITIZED
-#define SANITIZED 0
-#endif
 
 /* How each module is loaded, and a function that it must offer then. */
 static const struct component {
@@ -196,7 +184,7 @@ END_TEST
 
 START_TEST(a_module_calls_only_what_2_9_and_master_have)
 {
-    if (SANITIZED) {
+    if (TEST_SANITIZED) {
         printf("SKIP: a sanitizer adds calls of its own\n");
         return;
     }
@@ -314,21 +302,14 @@ START_TEST(every_module_loads_into_linuxcnc_as_an_ordinary_user_and_unloads_and_
 {
     static const char out[] = TEST_BUILD "/linuxcnc-load", hal[] = TEST_BUILD "/linuxcnc-load/hal/load.hal";
     const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer", TEST_BUILD, out, "7i96s", hal, NULL};
-    const char *skip;
-    if (SANITIZED) {
-        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
-        return;
-    }
-    if (!can_build())
+    if (!linuxcnc_loads_ours())
         return;
     expect_silence("rm -rf $BUILD/linuxcnc-load; mkdir -p $BUILD/linuxcnc-load/hal");
     write_hal_file(hal);
-    ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
+    linuxcnc_tell("PEER_MODULES", TEST_BUILD "/linuxcnc");
     process_run(&run, argv, LOAD_LIMIT_MS);
-    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
-        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
+    if (linuxcnc_skipped(&run))
         return;
-    }
     if (run.status != 0)
         give_up("an exit status that is not 0");
     check_loads();

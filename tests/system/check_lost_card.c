@@ -9,17 +9,12 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "linuxcnc_peer.h"
 #include "process.h"
 
-#define LIMIT_MS   1200000
-#define CANNOT_RUN 77
+#define LIMIT_MS 1200000
 
 static struct process run;
-
-static void set(const char *const name, const char *const value)
-{
-    ck_assert_int_eq(setenv(name, value, 1), 0);
-}
 
 START_TEST(a_lost_card_comes_back_without_a_restart)
 {
@@ -27,28 +22,16 @@ START_TEST(a_lost_card_comes_back_without_a_restart)
     const char *const seconds = getenv("LOST_CARD_SECONDS");
     const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer", TEST_BUILD, out,   "7i96s",
                                 TEST_SOURCE "/tests/system/hal/lost.hal",  "--follow", "0:0", NULL};
-    const char *skip;
-    if (TEST_SANITIZED) {
-        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+    if (!linuxcnc_loads_ours())
         return;
-    }
     (void)mkdir(out, 0755);
-    set("PEER_DRIVER", "hm2_lbp16");
-    set("PEER_CONFIG", "num_stepgens=5");
-    set("PEER_CARD", "hm2_7i96s.0");
-    set("PEER_MODULES", TEST_BUILD "/linuxcnc");
-    set("PEER_TIMEOUT", "1100");
-    set("LOSE_SECONDS", seconds ? seconds : "1");
-    process_run(&run, argv, LIMIT_MS);
-    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
-        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
-        return;
-    }
-    if (run.status != 0 || !process_wait_line(&run, "ok all", 0, NULL)) {
-        printf("%s\n", run.text);
-        fflush(stdout);
-        ck_abort_msg("the card did not come back as it should, status %d", run.status);
-    }
+    linuxcnc_tell("PEER_DRIVER", "hm2_lbp16");
+    linuxcnc_tell("PEER_CONFIG", "num_stepgens=5");
+    linuxcnc_tell("PEER_CARD", "hm2_7i96s.0");
+    linuxcnc_tell("PEER_MODULES", TEST_BUILD "/linuxcnc");
+    linuxcnc_tell("PEER_TIMEOUT", "1100");
+    linuxcnc_tell("LOSE_SECONDS", seconds ? seconds : "1");
+    linuxcnc_run_to_ok_all(&run, argv, LIMIT_MS, "the card did not come back as it should");
 }
 END_TEST
 

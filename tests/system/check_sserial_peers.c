@@ -13,12 +13,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "linuxcnc_peer.h"
 #include "simulator.h"
 
 #define MESA_TRIES  10u
 #define MESA_MS     20000
 #define PEER_MS     60000 /* besides the time that it is to run */
-#define CANNOT_RUN  77
 #define CARD        "hm2_7i96s.0"
 #define OUTPUTS     "32776" /* outputs 3 and 15 */
 #define RUN_SECONDS "10"
@@ -136,24 +136,13 @@ END_TEST
 
 static struct simulator card; /* for commands to the one that the peer script starts */
 
-static void set(const char *const name, const char *const value)
-{
-    ck_assert_int_eq(setenv(name, value, 1), 0);
-}
-
 static const char *const drivers[] = {"hm2_eth", "hm2_lbp16"};
 
 static bool can_load(const char *const driver)
 {
     if (strcmp(driver, "hm2_lbp16") != 0)
         return simulator_suits_linuxcnc();
-    if (TEST_SANITIZED)
-        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
-    else if (access(TEST_BUILD "/linuxcnc/hm2_lbp16.so", R_OK) != 0)
-        printf("SKIP: LinuxCNC's headers are not installed (linuxcnc-uspace-dev)\n");
-    else
-        return true;
-    return false;
+    return linuxcnc_loads_ours();
 }
 
 static void start_peer(const char *const driver, const char *const hal, const char *const config,
@@ -169,22 +158,13 @@ static void start_peer(const char *const driver, const char *const hal, const ch
     snprintf(card.control, sizeof card.control, "/tmp/check-sserial-%d", (int)getpid());
     for (; *options; options++)
         argv[n++] = *options;
-    set("PEER_DRIVER", driver);
+    linuxcnc_tell("PEER_DRIVER", driver);
     if (strcmp(driver, "hm2_lbp16") == 0)
-        set("PEER_MODULES", TEST_BUILD "/linuxcnc");
-    set("PEER_CARD", CARD);
-    set("PEER_CONFIG", config);
-    set("PEER_SECONDS", seconds);
+        linuxcnc_tell("PEER_MODULES", TEST_BUILD "/linuxcnc");
+    linuxcnc_tell("PEER_CARD", CARD);
+    linuxcnc_tell("PEER_CONFIG", config);
+    linuxcnc_tell("PEER_SECONDS", seconds);
     process_start(&run, argv);
-}
-
-static bool skipped(void)
-{
-    const char *skip;
-    if (run.status != CANNOT_RUN || !process_wait_line(&run, "SKIP: ", 0, &skip))
-        return false;
-    printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
-    return true;
 }
 
 /* HM2_LONG_SECONDS=60 in the environment makes it longer. */
@@ -200,7 +180,7 @@ static bool end_peer(void)
     if (!process_wait_end(&run, PEER_MS + 1000 * atoi(run_seconds())))
         process_stop(&run, SIGKILL, 0);
     unlink(card.control);
-    if (skipped())
+    if (linuxcnc_skipped(&run))
         return false;
     if (run.status != 0)
         give_up("not a good end");

@@ -9,17 +9,12 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "linuxcnc_peer.h"
 #include "process.h"
 
-#define LIMIT_MS   300000 /* half a minute, on a machine with nothing else to do */
-#define CANNOT_RUN 77
+#define LIMIT_MS 300000 /* half a minute, on a machine with nothing else to do */
 
 static struct process run;
-
-static void set(const char *const name, const char *const value)
-{
-    ck_assert_int_eq(setenv(name, value, 1), 0);
-}
 
 START_TEST(a_pulled_remote_stops_alone_is_reported_and_comes_back)
 {
@@ -46,27 +41,15 @@ START_TEST(a_pulled_remote_stops_alone_is_reported_and_comes_back)
                                        "--servo",
                                        "5:0:2:AnalogOut2:100000:20",
                                        NULL};
-    const char *skip;
-    if (TEST_SANITIZED) {
-        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+    if (!linuxcnc_loads_ours())
         return;
-    }
     (void)mkdir(out, 0755);
-    set("PEER_DRIVER", "hm2_lbp16");
-    set("PEER_CONFIG", "num_encoders=8 num_stepgens=5 sserial_port_0=000xxxxx");
-    set("PEER_CARD", "hm2_7i96s.0");
-    set("PEER_MODULES", TEST_BUILD "/linuxcnc");
-    set("PEER_TIMEOUT", "280");
-    process_run(&run, argv, LIMIT_MS);
-    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
-        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
-        return;
-    }
-    if (run.status != 0 || !process_wait_line(&run, "ok all", 0, NULL)) {
-        printf("%s\n", run.text);
-        fflush(stdout);
-        ck_abort_msg("not what should happen to a pulled remote, status %d", run.status);
-    }
+    linuxcnc_tell("PEER_DRIVER", "hm2_lbp16");
+    linuxcnc_tell("PEER_CONFIG", "num_encoders=8 num_stepgens=5 sserial_port_0=000xxxxx");
+    linuxcnc_tell("PEER_CARD", "hm2_7i96s.0");
+    linuxcnc_tell("PEER_MODULES", TEST_BUILD "/linuxcnc");
+    linuxcnc_tell("PEER_TIMEOUT", "280");
+    linuxcnc_run_to_ok_all(&run, argv, LIMIT_MS, "not what should happen to a pulled remote");
 }
 END_TEST
 

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "linuxcnc_peer.h"
+
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define CANNOT_RUN 77
+
+bool linuxcnc_loads_ours(void)
+{
+    if (TEST_SANITIZED)
+        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+    else if (access(TEST_BUILD "/linuxcnc/hm2_lbp16.so", R_OK) != 0)
+        printf("SKIP: LinuxCNC's headers are not installed (linuxcnc-uspace-dev)\n");
+    else
+        return true;
+    return false;
+}
+
+void linuxcnc_tell(const char *const name, const char *const value)
+{
+    ck_assert_int_eq(setenv(name, value, 1), 0);
+}
+
+bool linuxcnc_skipped(struct process *const run)
+{
+    const char *skip;
+    if (!run->ended || run->status != CANNOT_RUN || !process_wait_line(run, "SKIP: ", 0, &skip))
+        return false;
+    printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
+    return true;
+}
+
+void linuxcnc_run_to_ok_all(struct process *const run, const char *const *const argv, const int limit_ms,
+                            const char *const what)
+{
+    process_run(run, argv, limit_ms);
+    if (linuxcnc_skipped(run))
+        return;
+    if (run->status != 0 || !process_wait_line(run, "ok all", 0, NULL)) {
+        printf("%s\n", run->text); /* Check's own messages are short */
+        fflush(stdout);
+        ck_abort_msg("%s, status %d", what, run->status);
+    }
+}

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* LinuxCNC as host of a component, through the scripts linuxcnc-peer and halrun-user: whether it can run here, what the
+ * scripts are told, and what they answer. */
+#ifndef TEST_LINUXCNC_PEER_H
+#define TEST_LINUXCNC_PEER_H
+
+#include "process.h"
+
+/* False, and the reason printed as a skip, where LinuxCNC cannot load what this build made. */
+bool linuxcnc_loads_ours(void);
+
+/* The scripts are told by their environment. */
+void linuxcnc_tell(const char *name, const char *value);
+
+/* True, and the script's reason printed as a skip, when it has ended because something is missing on this machine. */
+bool linuxcnc_skipped(struct process *run);
+
+/* Run a script whose HAL file says "ok all" at its end; anything else fails the test, which names `what` then, unless
+ * it was skipped. */
+void linuxcnc_run_to_ok_all(struct process *run, const char *const *argv, int limit_ms, const char *what);
+
+#endif
