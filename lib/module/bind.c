@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#define PAGE_WORDS 64u /* 100h bytes of address space a register kind */
+
 int hm2_bind_item(const struct hm2_setup *const setup, const struct hm2_point_group *const group, void *const base,
                   const unsigned unit, const unsigned item)
 {
@@ -33,4 +35,12 @@ void *hm2_setup_alloc(const struct hm2_setup *const setup, const size_t size)
         (void)hm2_diag_add(setup->diag, HM2_ERR_NOMEM, "%s: the host has no memory left for %zu bytes of module data",
                            setup->prefix, size);
     return memory;
+}
+
+int hm2_check_page(const struct hm2_module *const module, const struct hm2_setup *const setup, const char *const what)
+{
+    if (module->instances <= PAGE_WORDS)
+        return 0;
+    return hm2_diag_add(setup->diag, HM2_ERR_MISMATCH, "%s: the firmware has %u %s; a register page holds at most %u",
+                        setup->prefix, module->instances, what, PAGE_WORDS);
 }

@@ -23,5 +23,7 @@ int HM2_MUST_CHECK hm2_bind_item(const struct hm2_setup *setup, const struct hm2
 
 /* Zeroed memory from the host, or NULL with the reason in the set-up's diag. */
 void *hm2_setup_alloc(const struct hm2_setup *setup, size_t size);
+/* HM2_ERR_MISMATCH, and a diagnosis, for more instances than a register page has words; what: their name, plural. */
+int hm2_check_page(const struct hm2_module *module, const struct hm2_setup *setup, const char *what);
 
 #endif

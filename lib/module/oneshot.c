@@ -9,15 +9,14 @@
 
 enum { REG_WIDTH1, REG_WIDTH2, REG_FILTER1, REG_FILTER2, REG_RATE, REG_CONTROL, TIMES = 5 };
 
-#define MAX_INSTANCES 64u
-#define SHOTS         2u
-#define WIDTH_MAX     0x7FFFFFFFu
-#define FILTER_MAX    0xFFFFFFu
-#define RATE_ONE      4294967296.0
-#define SELECT_MAX    7u
-#define TIMER_MAX     4
-#define TIMER_SHIFT   12
-#define SHOT_SHIFT    16u /* bits of the second are those of the first, so much higher */
+#define SHOTS       2u
+#define WIDTH_MAX   0x7FFFFFFFu
+#define FILTER_MAX  0xFFFFFFu
+#define RATE_ONE    4294967296.0
+#define SELECT_MAX  7u
+#define TIMER_MAX   4
+#define TIMER_SHIFT 12
+#define SHOT_SHIFT  16u /* bits of the second are those of the first, so much higher */
 
 /* Control register, first one-shot. */
 #define ON_RISE     0x0008u
@@ -211,10 +210,8 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup_
 {
     if (module->instances == 0)
         return 0;
-    if (module->instances > MAX_INSTANCES)
-        return hm2_diag_add(setup_->diag, HM2_ERR_MISMATCH,
-                            "%s: the firmware has %u one-shots; a register page holds at most %u", setup_->prefix,
-                            module->instances, MAX_INSTANCES);
+    if (hm2_check_page(module, setup_, "one-shots"))
+        return HM2_ERR_MISMATCH;
     struct oneshots *const ctx = hm2_setup_alloc(setup_, sizeof *ctx + module->instances * sizeof ctx->oneshot[0]);
     if (!ctx)
         return HM2_ERR_NOMEM;

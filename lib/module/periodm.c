@@ -9,7 +9,6 @@
 
 enum { REG_MODE, REG_PERIOD, REG_WIDTH, REG_LIMIT };
 
-#define MAX_INSTANCES 64u
 #define INVERT        0x1u
 #define VALID         0x2u
 #define LEVEL         0x4u
@@ -179,10 +178,8 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup_
 {
     if (module->instances == 0)
         return 0;
-    if (module->instances > MAX_INSTANCES)
-        return hm2_diag_add(setup_->diag, HM2_ERR_MISMATCH,
-                            "%s: the firmware has %u period meters; a register page holds at most %u", setup_->prefix,
-                            module->instances, MAX_INSTANCES);
+    if (hm2_check_page(module, setup_, "period meters"))
+        return HM2_ERR_MISMATCH;
     struct periodm *const ctx = hm2_setup_alloc(setup_, sizeof *ctx + module->instances * sizeof ctx->meter[0]);
     if (!ctx)
         return HM2_ERR_NOMEM;

@@ -9,13 +9,12 @@
 
 enum { REG_WIDTH, REG_RATE };
 
-#define MAX_INSTANCES 64u
-#define WIDTH_MAX     65535u
-#define NO_PULSE      0x10000u
-#define CLOCKS_STEP   16.0 /* of the clock in a step of the width register */
-#define RATE_MIN_HZ   0.01
-#define RATE_MAX_HZ   1000.0
-#define DIVISOR_MAX   0x7FFFFFFFu
+#define WIDTH_MAX   65535u
+#define NO_PULSE    0x10000u
+#define CLOCKS_STEP 16.0 /* of the clock in a step of the width register */
+#define RATE_MIN_HZ 0.01
+#define RATE_MAX_HZ 1000.0
+#define DIVISOR_MAX 0x7FFFFFFFu
 
 struct servo {
     hm2_float_t *width, *scale, *offset;
@@ -109,10 +108,8 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup_
 {
     if (module->instances == 0)
         return 0;
-    if (module->instances > MAX_INSTANCES)
-        return hm2_diag_add(setup_->diag, HM2_ERR_MISMATCH,
-                            "%s: the firmware has %u RC servo outputs; a register page holds at most %u",
-                            setup_->prefix, module->instances, MAX_INSTANCES);
+    if (hm2_check_page(module, setup_, "RC servo outputs"))
+        return HM2_ERR_MISMATCH;
     struct rcpwm *const ctx = hm2_setup_alloc(setup_, sizeof *ctx + module->instances * sizeof ctx->servo[0]);
     if (!ctx)
         return HM2_ERR_NOMEM;

@@ -15,20 +15,19 @@
 
 enum { REG_VALUE, REG_ENABLE, REG_SETUP, REG_RATE };
 
-#define MAX_INSTANCES 64u
-#define PHASES        3u
-#define PHASE_BITS    10u
-#define VALUE_HALF    512.0
-#define VALUE_SWING   511.0
-#define ENABLED       0x1u
-#define FAULT         0x2u
-#define DEAD_MAX      511u
-#define FAULT_HIGH    0x8000u
-#define SAMPLE_SHIFT  16
-#define SAMPLE_SPAN   1023.0
-#define RATE_ONE      65536.0
-#define RATE_MAX      65535u
-#define CYCLE_COUNTS  2048.0
+#define PHASES       3u
+#define PHASE_BITS   10u
+#define VALUE_HALF   512.0
+#define VALUE_SWING  511.0
+#define ENABLED      0x1u
+#define FAULT        0x2u
+#define DEAD_MAX     511u
+#define FAULT_HIGH   0x8000u
+#define SAMPLE_SHIFT 16
+#define SAMPLE_SPAN  1023.0
+#define RATE_ONE     65536.0
+#define RATE_MAX     65535u
+#define CYCLE_COUNTS 2048.0
 
 struct gen {
     hm2_float_t *value[PHASES];
@@ -246,10 +245,8 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup_
 {
     if (module->instances == 0)
         return 0;
-    if (module->instances > MAX_INSTANCES)
-        return hm2_diag_add(setup_->diag, HM2_ERR_MISMATCH,
-                            "%s: the firmware has %u three-phase PWM generators; a register page holds at most %u",
-                            setup_->prefix, module->instances, MAX_INSTANCES);
+    if (hm2_check_page(module, setup_, "three-phase PWM generators"))
+        return HM2_ERR_MISMATCH;
     struct tppwm *const ctx = hm2_setup_alloc(setup_, sizeof *ctx + module->instances * sizeof ctx->gen[0]);
     if (!ctx)
         return HM2_ERR_NOMEM;

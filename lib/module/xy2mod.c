@@ -9,7 +9,6 @@
 
 enum { REG_ACC = 0, REG_VEL = 2, REG_POS = 4, REG_MODE = 6, REG_COMMAND, REG_STATUS, REG_READ_TIMER, REG_WRITE_TIMER };
 
-#define MAX_INSTANCES 64u
 #define AXES          2u
 #define FULL_SCALE    2147483647.0
 #define POSITION_MAX  2147418112 /* the module's own limit */
@@ -283,10 +282,8 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup_
 {
     if (module->instances == 0)
         return 0;
-    if (module->instances > MAX_INSTANCES)
-        return hm2_diag_add(setup_->diag, HM2_ERR_MISMATCH,
-                            "%s: the firmware has %u galvo interfaces; a register page holds at most %u",
-                            setup_->prefix, module->instances, MAX_INSTANCES);
+    if (hm2_check_page(module, setup_, "galvo interfaces"))
+        return HM2_ERR_MISMATCH;
     struct xy2mod *const ctx = hm2_setup_alloc(setup_, sizeof *ctx + module->instances * sizeof ctx->galvo[0]);
     if (!ctx)
         return HM2_ERR_NOMEM;

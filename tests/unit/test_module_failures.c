@@ -3,6 +3,7 @@
 #include "unit.h"
 
 #include "module_rig.h"
+#include "module_types.h"
 
 /* A binder, and a way to the card, that fail from the n-th call on. */
 struct failing {
@@ -109,11 +110,30 @@ static void any_refusal_on_a_7i93_is_an_error_with_a_reason(void **state)
     fail_everywhere(rig_image_7i93);
 }
 
+/* A descriptor's count has eight bits; a page of registers has 64 words, and the next page is another register. */
+static void more_instances_than_a_page_of_registers_has_are_refused(void **state)
+{
+    (void)state;
+    static const struct hm2_module_type *const types[] = {&hm2_oneshot_type, &hm2_periodm_type, &hm2_rcpwmgen_type,
+                                                          &hm2_tppwm_type, &hm2_xy2mod_type};
+    for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
+        const struct rig_md modules[] = {
+            {HM2_GTAG_IOPORT, 0, 1, 3, 0x1000, 5, 0, 0x1F},
+            {types[i]->gtag, 0, 1, 65, 0x9000, 11, 0, 0x1FF},
+        };
+        struct module_rig *const rig = rig_new(rig_image_with(modules, 2, NULL, 0), "");
+        assert_int_equal(rig_try_add(rig, types[i]), HM2_ERR_MISMATCH);
+        assert_non_null(strstr(rig->diag.text, "at most 64"));
+        rig_free(rig);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_refusal_on_a_7i96s_is_an_error_with_a_reason),
         cmocka_unit_test(any_refusal_on_a_7i93_is_an_error_with_a_reason),
+        cmocka_unit_test(more_instances_than_a_page_of_registers_has_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
