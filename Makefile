@@ -166,7 +166,7 @@ $(BUILDDIR)/libhm2.pc: lib/libhm2.pc.in Makefile $(PATHS)
 # ---- programs and components --------------------------------------------------------------------------------------
 
 define tool_rule
-$(BUILDDIR)/$(1): $(call obj,$(wildcard tools/$(1)/*.c)) $$(if $$(filter hm2host,$(1)),$(HOST_A)) $(SIM_A) $(LIB_A)
+$(BUILDDIR)/$(1): $(call obj,$(wildcard tools/$(1)/*.c tools/common/*.c)) $$(if $$(filter hm2host,$(1)),$(HOST_A)) $(SIM_A) $(LIB_A)
 	@mkdir -p $$(@D)
 	$$(call say,LD,$$@)$$(CC) $$(ALL_CFLAGS) $$(LDFLAGS) -o $$@ $$(filter %.o,$$^) $$(TOOL_LIBS) -lm -lpthread
 endef

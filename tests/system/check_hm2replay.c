@@ -84,6 +84,18 @@ START_TEST(a_difference_is_printed_and_makes_the_exit_status)
 }
 END_TEST
 
+START_TEST(json_takes_any_name_of_a_folder)
+{
+    static const char odd[] = "\xC3\xA4 \xE2\x82\xAC\"\\\x01\xFF\xED\xA0\x80\xC3";
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, odd);
+    ck_assert_int_eq(mkdir(path, 0755), 0);
+    snprintf(path, sizeof path, "%s/encoder", odd);
+    ck_assert_int_eq(run("--json", trace(path, "test,clk,ev,name,value\nonly,30,R,count,00000001\n"), NULL), 1);
+    printed("/\xC3\xA4 \xE2\x82\xAC\\\"\\\\\\u0001\\u00ff\\u00ed\\u00a0\\u0080\\u00c3/encoder\", \"test\"");
+}
+END_TEST
+
 START_TEST(a_folder_of_no_kind_is_named_with_the_known_ones)
 {
     ck_assert_int_eq(run(trace("nosuch", "test,clk,ev,name,value\n"), NULL, NULL), 3);
@@ -119,6 +131,7 @@ int main(void)
     tcase_add_checked_fixture(tests, make_folder, remove_folder);
     tcase_add_loop_test(tests, every_recorded_folder_passes, 0, (int)replay_kind_count);
     tcase_add_test(tests, a_difference_is_printed_and_makes_the_exit_status);
+    tcase_add_test(tests, json_takes_any_name_of_a_folder);
     tcase_add_test(tests, a_folder_of_no_kind_is_named_with_the_known_ones);
     tcase_add_test(tests, a_broken_table_is_refused_with_its_line);
     tcase_add_test(tests, one_test_can_be_chosen);

@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../common/json_string.h"
+
 static const char *const type_names[] = {
     [HM2_BIT] = "bit", [HM2_S32] = "s32", [HM2_U32] = "u32", [HM2_FLOAT] = "float"};
 static const char *const kind_names[] = {[HM2_DBC_UNSIGNED] = "unsigned",
@@ -91,22 +93,10 @@ void list_text(const struct listing *const l)
 /* ---- JSON
  * ------------------------------------------------------------------------------------------------------------ */
 
-/* DBC files are in the Windows alphabet, whose letters above ASCII have nearly all their numbers in Unicode. */
-static void json_string(const char *const text)
-{
-    putchar('"');
-    for (const unsigned char *c = (const unsigned char *)text; *c; c++)
-        if (*c < 0x20u || *c >= 0x7Fu)
-            printf("\\u%04X", *c);
-        else
-            printf(*c == '"' || *c == '\\' ? "\\%c" : "%c", *c);
-    putchar('"');
-}
-
 static void json_member(const char *const name, const char *const text)
 {
     printf(", \"%s\": ", name);
-    json_string(text);
+    json_string(stdout, text);
 }
 
 static void json_multiplexing(const struct listing *const l, const struct hm2_dbc_signal *const s)
@@ -125,7 +115,7 @@ static void json_signal(const struct listing *const l, const struct hm2_dbc_mess
                         const struct hm2_dbc_signal *const s)
 {
     fputs("{\"name\": ", stdout);
-    json_string(s->name);
+    json_string(stdout, s->name);
     json_member("pin", pin_of(l, m, s));
     json_member("byte_order", s->big_endian ? "motorola" : "intel");
     json_member("kind", kind_names[s->kind]);
@@ -137,7 +127,7 @@ static void json_signal(const struct listing *const l, const struct hm2_dbc_mess
     fputs(", \"values\": {", stdout);
     for (uint32_t i = 0; i < s->values; i++) {
         printf("%s\"%" PRId64 "\": ", i ? ", " : "", l->dbc->values[s->first_value + i].raw);
-        json_string(l->dbc->values[s->first_value + i].text);
+        json_string(stdout, l->dbc->values[s->first_value + i].text);
     }
     fputs("}}", stdout);
 }
@@ -145,7 +135,7 @@ static void json_signal(const struct listing *const l, const struct hm2_dbc_mess
 static void json_message(const struct listing *const l, const struct hm2_dbc_message *const m)
 {
     fputs("{\"name\": ", stdout);
-    json_string(m->name);
+    json_string(stdout, m->name);
     json_member("use", use_of(l, m));
     printf(", \"id\": %u, \"extended\": %s, \"fd\": %s, \"bytes\": %u, \"cycle_ms\": %u, \"on_change\": %s, "
            "\"signals\": [",
@@ -161,13 +151,13 @@ static void json_message(const struct listing *const l, const struct hm2_dbc_mes
 void list_json(const struct listing *const l)
 {
     fputs("{\"file\": ", stdout);
-    json_string(l->file);
+    json_string(stdout, l->file);
     printf(", \"good\": %s", l->dbc ? "true" : "false");
     json_member("sentences", l->diag->text);
     fputs(", \"nodes\": [", stdout);
     for (uint32_t i = 0; l->dbc && i < l->dbc->node_count; i++) {
         fputs(i ? ", " : "", stdout);
-        json_string(l->dbc->nodes[i]);
+        json_string(stdout, l->dbc->nodes[i]);
     }
     fputs("], \"messages\": [", stdout);
     for (uint32_t i = 0; l->dbc && i < l->dbc->message_count; i++) {

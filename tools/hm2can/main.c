@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../common/whole_file.h"
 #include "list.h"
 
 static const char usage[] =
@@ -25,24 +26,6 @@ struct options {
     const char *node;
     bool check, json, floats;
 };
-
-static char *read_file(const char *const path, size_t *const len)
-{
-    FILE *const file = fopen(path, "rb");
-    char *const text = file ? malloc(HM2_DBC_MAX_TEXT + 1u) : NULL;
-    bool failed = !text;
-    if (text) {
-        *len = fread(text, 1, HM2_DBC_MAX_TEXT + 1u, file);
-        failed = ferror(file) != 0;
-    }
-    if (failed) {
-        fprintf(stderr, "hm2can: cannot read %s: %s\n", path, strerror(errno));
-        free(text);
-    }
-    if (file)
-        (void)fclose(file);
-    return failed ? NULL : text;
-}
 
 static int find_node(const struct options *const options, struct listing *const l, struct hm2_diag *const diag)
 {
@@ -72,9 +55,11 @@ static int look_at(const struct options *const options, const char *const path)
     struct hm2_dbc *dbc = NULL;
     struct hm2_diag diag;
     size_t len = 0;
-    char *const text = read_file(path, &len);
-    if (!text)
+    char *const text = whole_file(path, HM2_DBC_MAX_TEXT, &len);
+    if (!text) {
+        fprintf(stderr, "hm2can: cannot read %s: %s\n", path, strerror(errno));
         return EXIT_FAILURE;
+    }
     hm2_diag_clear(&diag);
     int err = hm2_dbc_read(text, len, path, &dbc, &diag);
     free(text);

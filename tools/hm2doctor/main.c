@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../common/json_string.h"
 #include "command.h"
 #include "doctor.h"
 
@@ -167,29 +168,15 @@ static bool sensible(const struct request *const request)
 
 static const char *const grade_names[] = {"ok", "unknown", "advice", "fault"};
 
-static void print_string(const char *text)
-{
-    putchar('"');
-    for (; *text; text++) {
-        if (*text == '"' || *text == '\\')
-            putchar('\\');
-        if ((unsigned char)*text < ' ')
-            printf("\\u%04x", (unsigned)*text);
-        else
-            putchar(*text);
-    }
-    putchar('"');
-}
-
 static void print_json(const struct findings *const findings, const struct rounds *const rounds)
 {
     printf("{\"findings\":[");
     for (unsigned i = 0; i < findings->count; i++) {
         const struct finding *const f = &findings->list[i];
         printf("%s\n{\"check\":\"%s\",\"grade\":\"%s\",\"what\":", i ? "," : "", f->check, grade_names[f->grade]);
-        print_string(f->what);
+        json_string(stdout, f->what);
         printf(",\"remedy\":");
-        print_string(f->remedy);
+        json_string(stdout, f->remedy);
         printf(",\"at_once\":%s}", f->at_once ? "true" : "false");
     }
     printf("]");

@@ -67,8 +67,6 @@ void json_result(const struct cli *cli, const char *action);
 
 #define SHA256_TEXT 65u
 
-/* Whole file; NULL with errno set. */
-uint8_t *read_file(const char *path, size_t most, size_t *len);
 void sha256_text(const uint8_t *bytes, size_t len, char text[SHA256_TEXT]);
 /* Compare bytes with PATH.sha256: 0, or an exit status. A file that is not there is an error only when required. */
 int check_side_file(struct cli *cli, const char *path, const uint8_t *bytes, size_t len, bool required,

@@ -8,30 +8,11 @@
 
 #include <sha2.h>
 
+#include "../common/whole_file.h"
 #include "cli.h"
 
 #define SIDE_MOST 65536u
 #define LIST_MOST 1048576u
-
-uint8_t *read_file(const char *const path, const size_t most, size_t *const len)
-{
-    FILE *const file = fopen(path, "rb");
-    uint8_t *const bytes = file ? malloc(most + 1) : NULL;
-    if (bytes)
-        *len = fread(bytes, 1, most + 1, file);
-    int error = file && bytes ? 0 : errno;
-    if (bytes && ferror(file))
-        error = errno ? errno : EIO;
-    else if (bytes && *len > most)
-        error = EFBIG;
-    if (file)
-        fclose(file);
-    if (error == 0)
-        return bytes;
-    free(bytes);
-    errno = error;
-    return NULL;
-}
 
 static void digest(const uint8_t *const bytes, const size_t len, uint8_t hash[const FLASH_SHA256_BYTES])
 {
@@ -61,7 +42,7 @@ int check_side_file(struct cli *const cli, const char *const path, const uint8_t
     uint8_t expected[FLASH_SHA256_BYTES], found[FLASH_SHA256_BYTES];
     size_t side_len;
     snprintf(side, sizeof side, "%s.sha256", path);
-    uint8_t *const content = read_file(side, SIDE_MOST, &side_len);
+    uint8_t *const content = whole_file(side, SIDE_MOST, &side_len);
     if (!content && errno == ENOENT && !required)
         return DONE;
     if (!content)
@@ -89,7 +70,7 @@ int look_up_image(struct cli *const cli, const uint8_t *const bytes, const size_
     card[0] = '\0';
     if (!cli->known)
         return DONE;
-    uint8_t *const list = read_file(cli->known, LIST_MOST, &list_len);
+    uint8_t *const list = whole_file(cli->known, LIST_MOST, &list_len);
     if (!list)
         return complain(cli, REFUSED, "Can't open the list of known images '%s': %s", cli->known, strerror(errno));
     digest(bytes, len, hash);

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../common/json_string.h"
 #include "cli.h"
 
 #define MAX_DEPTH 8u
@@ -17,23 +18,10 @@ static void comma(void)
     started[depth] = true;
 }
 
-static void put_string(const char *text)
-{
-    putchar('"');
-    for (; *text; text++)
-        if (*text == '"' || *text == '\\')
-            printf("\\%c", *text);
-        else if ((unsigned char)*text < ' ' || (unsigned char)*text > '~')
-            printf("\\u%04X", (unsigned char)*text);
-        else
-            putchar(*text);
-    putchar('"');
-}
-
 static void put_key(const char *const key)
 {
     comma();
-    put_string(key);
+    json_string(stdout, key);
     fputs(": ", stdout);
 }
 
@@ -61,7 +49,7 @@ void json_text(const struct cli *const cli, const char *const key, const char *c
     if (!cli->json)
         return;
     put_key(key);
-    put_string(value);
+    json_string(stdout, value);
 }
 
 void json_number(const struct cli *const cli, const char *const key, const double value)

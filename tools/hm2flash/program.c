@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <time.h>
 
+#include "../common/whole_file.h"
 #include "cli.h"
 
 #define IMAGE_MOST (2u * FLASH_MAX_BYTES)
@@ -25,7 +26,7 @@ static struct flash_options options_of(const struct cli *const cli, const char *
 
 static uint8_t *load(const struct cli *const cli, const char *const path, const char *const what, size_t *const len)
 {
-    uint8_t *const bytes = read_file(path, IMAGE_MOST, len);
+    uint8_t *const bytes = whole_file(path, IMAGE_MOST, len);
     if (!bytes && errno == ENOENT)
         (void)complain(cli, REFUSED, "Can't find %s %s", what, path);
     else if (!bytes)
@@ -450,7 +451,7 @@ static int check_origin(struct cli *const cli, const char *const path)
     char side[4096];
     size_t len;
     snprintf(side, sizeof side, "%s.card", path);
-    uint8_t *const text = read_file(side, MOST, &len);
+    uint8_t *const text = whole_file(side, MOST, &len);
     if (!text)
         return DONE; /* mesaflash makes none */
     int status = DONE;
@@ -550,7 +551,7 @@ int do_info(struct cli *const cli, const char *const arg)
     struct flash_image image;
     char hash[SHA256_TEXT];
     size_t len;
-    uint8_t *const bytes = read_file(arg, IMAGE_MOST, &len);
+    uint8_t *const bytes = whole_file(arg, IMAGE_MOST, &len);
     if (!bytes)
         return complain(cli, REFUSED, "Can't open file %s: %s", arg, strerror(errno));
     const bool verbose = cli->verbose;

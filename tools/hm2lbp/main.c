@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* hm2lbp: parameters and firmware of smart-serial remotes. */
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,6 +10,7 @@
 #include <hm2/board.h>
 #include <hm2/lbp_remote.h>
 
+#include "../common/whole_file.h"
 #include "options.h"
 
 struct session {
@@ -270,16 +272,6 @@ static int write_one(struct session *const s)
 /* ---- firmware -----------------------------------------------------------------------------------------------------
  */
 
-static int read_image(struct session *const s, const char *const path, uint8_t *const image, size_t *const len)
-{
-    FILE *const file = fopen(path, "rb");
-    *len = file ? fread(image, 1, LBP_IMAGE_MAX + 1, file) : 0;
-    const bool failed = !file || ferror(file);
-    if (file)
-        fclose(file);
-    return failed ? hm2_diag_add(&s->diag, HM2_ERR_IO, "%s cannot be read.", path) : 0;
-}
-
 /* The images carry nothing that tells what they are for but their names: 7I77.BIN is for a 7I77. */
 static int check_name(struct session *const s, const char *const path)
 {
@@ -302,14 +294,11 @@ static void show_progress(void *const context, const uint32_t done_bytes, const 
                 done_bytes == all_bytes ? "\n" : "");
 }
 
-static int program(struct session *const s, const char *const path, uint8_t *const image)
+static int program(struct session *const s, const uint8_t *const image, const size_t len)
 {
     struct lbp_flash flash;
-    size_t len = 0;
     char warning[256];
-    int err = read_image(s, path, image, &len);
-    if (!err)
-        err = lbp_remote_check_image(&s->remote, image, len, &flash);
+    int err = lbp_remote_check_image(&s->remote, image, len, &flash);
     snprintf(warning, sizeof warning, "The firmware of this %s will be replaced.", s->remote.identity.name);
     if (!err)
         err = confirm(s, warning);
@@ -324,13 +313,18 @@ static int program(struct session *const s, const char *const path, uint8_t *con
 
 static int update(struct session *const s)
 {
-    int err = check_name(s, s->options.words[1]);
+    const char *const path = s->options.words[1];
+    int err = check_name(s, path);
     if (err)
         return err;
-    uint8_t *const image = malloc(LBP_IMAGE_MAX + 1);
+    size_t len;
+    uint8_t *const image = whole_file(path, LBP_IMAGE_MAX, &len);
+    if (!image && errno == EFBIG)
+        return hm2_diag_add(&s->diag, HM2_ERR_MISMATCH, "%s is no firmware of a remote: expected up to %u bytes.", path,
+                            (unsigned)LBP_IMAGE_MAX);
     if (!image)
-        return hm2_diag_add(&s->diag, HM2_ERR_NOMEM, "no memory for an image");
-    err = program(s, s->options.words[1], image);
+        return hm2_diag_add(&s->diag, HM2_ERR_IO, "%s cannot be read: %s.", path, strerror(errno));
+    err = program(s, image, len);
     free(image);
     return err;
 }

@@ -8,6 +8,8 @@
 
 #include <hm2/modbus.h>
 
+#include "../common/whole_file.h"
+
 static const char usage[] = "Usage: hm2modbus --check FILE...\n"
                             "Check Modbus maps, which are files of LinuxCNC's mb2hal and of modbus_io.\n"
                             "\n"
@@ -16,23 +18,6 @@ static const char usage[] = "Usage: hm2modbus --check FILE...\n"
                             "  --version  version\n"
                             "\n"
                             "Exit status: 0 all files are good, 1 one is not, 2 wrong command line.\n";
-
-static char *read_file(const char *const path, size_t *const length)
-{
-    FILE *const file = fopen(path, "re");
-    char *const text = file ? malloc(HM2_MODBUS_FILE_BYTES + 1u) : NULL;
-    if (text)
-        *length = fread(text, 1, HM2_MODBUS_FILE_BYTES + 1u, file);
-    if (!text || ferror(file)) {
-        fprintf(stderr, "hm2modbus: %s: cannot be read: %s\n", path, strerror(errno));
-        free(text);
-        if (file)
-            (void)fclose(file);
-        return NULL;
-    }
-    (void)fclose(file);
-    return text;
-}
 
 static void describe(const char *const path, const struct hm2_modbus_map *const map)
 {
@@ -52,9 +37,11 @@ static int check(const char *const path)
     size_t length;
     struct hm2_modbus_map *map;
     struct hm2_diag diag = {0};
-    char *const text = read_file(path, &length);
-    if (!text)
+    char *const text = whole_file(path, HM2_MODBUS_FILE_BYTES, &length);
+    if (!text) {
+        fprintf(stderr, "hm2modbus: %s: cannot be read: %s\n", path, strerror(errno));
         return EXIT_FAILURE;
+    }
     const int err = hm2_modbus_parse(text, length, path, &map, &diag);
     free(text);
     fputs(diag.text, stderr);

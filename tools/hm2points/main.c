@@ -8,6 +8,8 @@
 #include <hm2/board.h>
 #include <hm2/module.h>
 
+#include "../common/json_string.h"
+
 static const char *const type_names[] = {
     [HM2_BIT] = "bit", [HM2_S32] = "s32", [HM2_U32] = "u32", [HM2_FLOAT] = "float"};
 static const char *const dir_names[] = {
@@ -60,17 +62,6 @@ static void nothing(void)
 
 /* ---- JSON ---------------------------------------------------------------------------------------------------------*/
 
-static void json_string(const char *const text)
-{
-    putchar('"');
-    for (const char *c = text; *c; c++) {
-        if (*c == '"' || *c == '\\')
-            putchar('\\');
-        putchar(*c);
-    }
-    putchar('"');
-}
-
 static void json_begin(void)
 {
     puts("[");
@@ -81,12 +72,12 @@ static void json_row(const char *const prefix, const struct hm2_point *const poi
     char name[256];
     full_name(name, sizeof name, prefix, point->name);
     printf("%s  {\"name\": ", first ? "" : ",\n");
-    json_string(name);
+    json_string(stdout, name);
     printf(", \"kind\": \"%s\", \"type\": \"%s\", \"dir\": \"%s\", \"default\": %.10g, \"unit\": ",
            is_param(point) ? "param" : "pin", type_names[point->type], dir_names[point->dir], point->initial);
-    json_string(point->unit);
+    json_string(stdout, point->unit);
     printf(", \"help\": ");
-    json_string(point->help);
+    json_string(stdout, point->help);
     putchar('}');
 }
 

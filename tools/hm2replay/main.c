@@ -9,6 +9,8 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "../common/json_string.h"
+#include "../common/whole_file.h"
 #include "replay.h"
 
 enum { EXIT_DIFFERENCE = 1, EXIT_USAGE = 2, EXIT_UNREADABLE = 3 };
@@ -31,24 +33,6 @@ struct folder {
 /* ---- files
  * ----------------------------------------------------------------------------------------------------------- */
 
-static int load_stream(FILE *const stream, const char *const name, char **const text, size_t *const len,
-                       struct hm2_diag *const diag)
-{
-    struct stat st;
-    if (fstat(fileno(stream), &st) || !S_ISREG(st.st_mode))
-        return hm2_diag_add(diag, HM2_ERR_IO, "%s is not a regular file.", name);
-    if (st.st_size > (off_t)MAX_FILE_BYTES)
-        return hm2_diag_add(diag, HM2_ERR_RANGE, "%s is larger than %u bytes.", name, MAX_FILE_BYTES);
-    const size_t size = (size_t)st.st_size;
-    char *const buffer = malloc(size + 1);
-    if (!buffer)
-        return hm2_diag_add(diag, HM2_ERR_NOMEM, "No memory for %s.", name);
-    *len = fread(buffer, 1, size, stream);
-    buffer[*len] = '\0';
-    *text = buffer;
-    return 0;
-}
-
 static int load(void *const context, const char *const name, char **const text, size_t *const len,
                 struct hm2_diag *const diag)
 {
@@ -59,13 +43,11 @@ static int load(void *const context, const char *const name, char **const text, 
     const int n = snprintf(path, sizeof(path), "%s/%s", folder->path, name);
     if (n < 0 || (size_t)n >= sizeof(path))
         return hm2_diag_add(diag, HM2_ERR_RANGE, "The path of %.80s is too long.", name);
-    FILE *const stream = fopen(path, "rb");
-    if (!stream)
-        return errno == ENOENT ? HM2_ERR_NOTFOUND
-                               : hm2_diag_add(diag, HM2_ERR_IO, "%s cannot be read: %s.", path, strerror(errno));
-    const int err = load_stream(stream, path, text, len, diag);
-    fclose(stream);
-    return err;
+    *text = whole_file(path, MAX_FILE_BYTES, len);
+    if (*text)
+        return 0;
+    return errno == ENOENT ? HM2_ERR_NOTFOUND
+                           : hm2_diag_add(diag, HM2_ERR_IO, "%s cannot be read: %s.", path, strerror(errno));
 }
 
 static bool list(void *const context, const size_t index, char *const name, const size_t size)
@@ -131,32 +113,17 @@ static void base_name(const char *const path, char *const name, const size_t siz
 /* ---- results
  * ---------------------------------------------------------------------------------------------------------- */
 
-static void print_json_string(const char *text)
-{
-    putchar('"');
-    for (; *text; text++) {
-        const unsigned char c = (unsigned char)*text;
-        if (c == '"' || c == '\\')
-            printf("\\%c", c);
-        else if (c < 0x20 || c >= 0x7F)
-            printf("\\u%04x", c);
-        else
-            putchar(c);
-    }
-    putchar('"');
-}
-
 static void on_result(void *const context, const char *const test, const bool passed, const char *const difference)
 {
     const struct folder *const folder = context;
     if (folder->settings->json) {
         printf("%s\n    {\"folder\": ", *folder->first_result ? "" : ",");
         *folder->first_result = false;
-        print_json_string(folder->path);
+        json_string(stdout, folder->path);
         printf(", \"test\": ");
-        print_json_string(test);
+        json_string(stdout, test);
         printf(", \"passed\": %s, \"difference\": ", passed ? "true" : "false");
-        print_json_string(difference);
+        json_string(stdout, difference);
         printf("}");
     } else {
         printf("%s %s/%s%s%s\n", passed ? "ok" : "not ok", folder->path, test, passed ? "" : ": ", difference);

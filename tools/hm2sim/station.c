@@ -10,6 +10,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "../common/whole_file.h"
 #include "remotes.h"
 
 #define MAX_FIRMWARE_BYTES (1u << 20)
@@ -117,20 +118,11 @@ int64_t station_next_ns(const struct station *const s)
 
 static int read_firmware(const char *const path, struct hm2_image *const image, struct hm2_diag *const diag)
 {
-    FILE *const file = fopen(path, "rb");
-    if (!file)
-        return hm2_diag_add(diag, HM2_ERR_IO, "firmware %s: %s", path, strerror(errno));
-    char *const text = malloc(MAX_FIRMWARE_BYTES);
-    const size_t len = text ? fread(text, 1, MAX_FIRMWARE_BYTES, file) : 0;
-    const int failed = ferror(file);
-    fclose(file);
-    int err;
-    if (!text || failed)
-        err = hm2_diag_add(diag, HM2_ERR_IO, "firmware %s cannot be read", path);
-    else if (len == MAX_FIRMWARE_BYTES)
-        err = hm2_diag_add(diag, HM2_ERR_RANGE, "firmware %s is longer than %u bytes", path, MAX_FIRMWARE_BYTES);
-    else
-        err = hm2_image_from_text(text, len, image, diag);
+    size_t len;
+    char *const text = whole_file(path, MAX_FIRMWARE_BYTES, &len);
+    if (!text)
+        return hm2_diag_add(diag, HM2_ERR_IO, "firmware %s cannot be read: %s", path, strerror(errno));
+    const int err = hm2_image_from_text(text, len, image, diag);
     free(text);
     return err;
 }

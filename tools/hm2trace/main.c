@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../common/whole_file.h"
 #include "trace.h"
 
 enum { EXIT_FILE = 1, EXIT_USAGE = 2 };
@@ -34,25 +35,6 @@ static const char help[] = "Usage: hm2trace [OPTION]... FILE\n"
                            "  -h, --help        this text\n"
                            "  --version         the version\n";
 
-static char *load(const char *const path, size_t *const len)
-{
-    FILE *const file = fopen(path, "rb");
-    char *text = file ? malloc(MAX_FILE_BYTES) : NULL;
-    if (!text) {
-        fprintf(stderr, "hm2trace: %s: %s\n", path, strerror(errno));
-    } else {
-        *len = fread(text, 1, MAX_FILE_BYTES, file);
-        if (ferror(file) || !feof(file)) {
-            fprintf(stderr, "hm2trace: %s: %s\n", path, ferror(file) ? strerror(errno) : "longer than 64 MiB");
-            free(text);
-            text = NULL;
-        }
-    }
-    if (file)
-        fclose(file);
-    return text;
-}
-
 static void take(void *const context, const struct hm2_flight_cycle *const cycle)
 {
     struct trace *const trace = context;
@@ -63,7 +45,9 @@ static bool read_trace(const char *const path, struct trace *const trace)
 {
     size_t len = 0;
     struct hm2_diag diag = {0};
-    char *const text = load(path, &len);
+    char *const text = whole_file(path, MAX_FILE_BYTES, &len);
+    if (!text)
+        fprintf(stderr, "hm2trace: %s: %s\n", path, strerror(errno));
     trace->cycles = text ? malloc((len / MIN_LINE_BYTES + 1) * sizeof *trace->cycles) : NULL;
     const int err = trace->cycles ? hm2_flight_parse(text, len, &trace->head, take, trace, &diag) : HM2_ERR_NOMEM;
     if (text && err < 0)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Tables and statistics, for people and for scripts. */
+#include "../common/json_string.h"
 #include "trace.h"
 
 #include <inttypes.h>
@@ -116,19 +117,12 @@ static void json_part(FILE *const out, const char *const name, const struct stat
             first ? "" : ",", name, s->count, s->median, s->most, s->nearly_all, s->max);
 }
 
-/* The card's name comes from a file: only what a name can have is printed. */
-static void json_name(FILE *const out, const char *const name)
-{
-    for (const char *c = name; *c; c++)
-        fputc(*c >= ' ' && *c <= '~' && *c != '"' && *c != '\\' ? *c : '?', out);
-}
-
 int print_json(FILE *const out, const struct trace *const trace)
 {
-    fprintf(out, "{\n  \"card\": \"");
-    json_name(out, trace->head.card);
+    fprintf(out, "{\n  \"card\": ");
+    json_string(out, trace->head.card);
     fprintf(out,
-            "\",\n  \"period_ns\": %" PRId64 ",\n  \"cause\": \"%s\",\n  \"cause_cycle\": %" PRIu32
+            ",\n  \"period_ns\": %" PRId64 ",\n  \"cause\": \"%s\",\n  \"cause_cycle\": %" PRIu32
             ",\n  \"cycles\": %zu,\n  \"lost\": %zu,\n  \"parts\": {",
             trace->head.period_ns, hm2_flight_cause_name(trace->head.cause), trace->head.cause_cycle, trace->count,
             lost(trace));
