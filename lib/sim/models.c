@@ -23,6 +23,7 @@ extern const struct sim_module_ops sim_pktuart_tx_ops;
 extern const struct sim_module_ops sim_periodm_ops;
 extern const struct sim_module_ops sim_pwmgen_ops;
 extern const struct sim_module_ops sim_rcpwm_ops;
+extern const struct sim_module_ops sim_resolver_ops;
 extern const struct sim_module_ops sim_ssi_ops;
 extern const struct sim_module_ops sim_stepgen_ops;
 extern const struct sim_module_ops sim_sserial_ops;
@@ -65,6 +66,7 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_wavegen_ops,       /* 14 */
     &sim_rcpwm_ops,         /* 2C */
     &sim_periodm_ops,       /* C8 */
+    &sim_resolver_ops,      /* C0 */
     &sim_xy2mod_ops,        /* 2B */
     NULL,
 };

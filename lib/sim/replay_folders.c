@@ -331,6 +331,19 @@ static const struct replay_signal wavegen_signals[] = {
     {NULL, REPLAY_PAD, 0, 0, 0},
 };
 
+/* ---- resolver ------------------------------------------------------------------------------------------------------
+ */
+
+static const struct replay_register resolver_registers[] = {
+    {"command", 0x3A00, 0}, {"data", 0x3B00, 0}, {"status", 0x3C00, 0},
+    {"vel", 0x3D00, 4},     {"pos", 0x3E00, 4},  {NULL, 0, 0},
+};
+
+static const struct replay_signal resolver_signals[] = {
+    {"pwren", REPLAY_OUTPUT, HM2_GTAG_RESOLVER, 0x81, 0},
+    {NULL, REPLAY_PAD, 0, 0, 0},
+};
+
 /* ---- before a test
  * ---------------------------------------------------------------------------------------------------- */
 
@@ -497,6 +510,17 @@ const struct replay_kind replay_kinds[] = {
      .profile = "7i93",
      .registers = wavegen_registers,
      .signals = wavegen_signals},
+    {.folder = "resolver",
+     .firmware = "SVRM6_48",
+     .profile = "7i93",
+     .registers = resolver_registers,
+     .signals = resolver_signals,
+     .prepare = replay_resolver_prepare,
+     .before_event = replay_resolver_event,
+     .on_edge = replay_resolver_edge,
+     .near = replay_resolver_near,
+     .bench_output = "exc_sign",
+     .extra = replay_resolver_excitation},
     {.folder = "idrom", .extra = replay_idrom, .no_events = true},
     {.folder = "tram", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_tram, .no_events = true},
     {.folder = "lbp16", .firmware = "JUSTIO_72", .profile = "7i80hd-16", .extra = replay_lbp16, .no_events = true},

@@ -96,6 +96,10 @@ struct replay_kind {
     int (*make_inputs)(const struct replay_trace *trace, const struct replay_test *test, struct replay_event_list *out);
     /* What the bench did at the edges of outputs that prepare() watches. May be NULL. */
     void (*on_edge)(struct replay_run *run, int64_t clk, unsigned watch, enum sim_level level);
+    /* Registers that are compared with a tolerance, and an output of the bench itself, which it compares. NULL = none.
+     */
+    bool (*near)(const struct replay_event *event, uint32_t expected, uint32_t got);
+    const char *bench_output;
     uint8_t loop_gtag; /* module whose output the bench led back to its input */
     /* The recording of output edges ends somewhere: edges after the last recorded one are not compared. */
     bool edges_end_early;
@@ -131,6 +135,12 @@ struct replay_watch {
     bool has_initial;
 };
 
+/* Two low-pass filters, one behind the other, as they were at `clk`. */
+struct replay_filter {
+    int64_t clk;
+    double in, first, second;
+};
+
 struct replay_run {
     const struct replay_kind *kind;
     const struct replay_trace *trace;
@@ -145,6 +155,7 @@ struct replay_run {
     uint64_t state[8];                      /* for before_event: zero at the start of a test */
     int bench_watch[REPLAY_BENCH_PINS];     /* for prepare and on_edge */
     enum sim_level bench_level[REPLAY_BENCH_PINS];
+    struct replay_filter filter;
     char difference[REPLAY_TEXT];
 };
 
@@ -181,6 +192,15 @@ int replay_sslbp_polls(const struct replay_trace *trace, const struct replay_tes
 int replay_spi_prepare(struct replay_run *run);
 void replay_spi_edge(struct replay_run *run, int64_t clk, unsigned watch, enum sim_level level);
 int replay_spi_word(struct replay_run *run, const struct replay_event *event);
+
+/* Bench of the resolver recordings. */
+int replay_resolver_prepare(struct replay_run *run);
+int replay_resolver_event(struct replay_run *run, const struct replay_event *event);
+void replay_resolver_edge(struct replay_run *run, int64_t clk, unsigned watch, enum sim_level level);
+bool replay_resolver_near(const struct replay_event *event, uint32_t expected, uint32_t got);
+int replay_resolver_excitation(const struct replay_kind *kind, const struct replay_files *files,
+                               const struct replay_options *options, struct replay_totals *totals,
+                               struct hm2_diag *diag);
 
 /* Bench of the serial recordings. */
 int replay_serial_inputs(const struct replay_trace *trace, const struct replay_test *test,

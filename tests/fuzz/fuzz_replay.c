@@ -22,7 +22,11 @@ static unsigned number_of(const char *const name)
     for (size_t i = 0; i < sizeof(first) / sizeof(first[0]); i++)
         if (strcmp(name, first[i]) == 0)
             return 0;
-    return strcmp(name, "measure.csv") == 0 || strcmp(name, "truth.csv") == 0 ? 2 : 1;
+    static const char *const third[] = {"measure.csv", "truth.csv", "excitation.csv"};
+    for (size_t i = 0; i < sizeof(third) / sizeof(third[0]); i++)
+        if (strcmp(name, third[i]) == 0)
+            return 2;
+    return 1;
 }
 
 static int load(void *const context, const char *const name, char **const text, size_t *const len,
@@ -62,7 +66,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *const data, const size_t size)
 {
     static const char *const kinds[] = {"encoder", "encoder_muxed", "pwmgen",      "stepgen", "watchdog", "ioport",
                                         "hm2dpll", "idrom",         "lbp16",       "bspi",    "dbspi",    "spi",
-                                        "uart",    "pktuart",       "pktuart_new", "tram"};
+                                        "uart",    "pktuart",       "pktuart_new", "tram",    "resolver"};
     if (size < 1)
         return 0;
     struct input input = {.data = data + 1, .size = size - 1};

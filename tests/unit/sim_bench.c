@@ -15,8 +15,8 @@ struct sim_bench *sim_bench_new(const char *const profile, const char *const fir
     static struct hm2_image image;
     struct sim_bench *const bench = calloc(1, sizeof *bench);
     assert_non_null(bench);
-    assert_true(replay_firmware(firmware, &image));
-    const struct sim_card_options options = {.profile = profile, .seed = 1, .image = &image};
+    assert_true(!firmware || replay_firmware(firmware, &image));
+    const struct sim_card_options options = {.profile = profile, .seed = 1, .image = firmware ? &image : NULL};
     check(bench, sim_card_new(&bench->card, &options, &bench->diag));
     assert_int_equal(sim_net_new(&bench->net, bench->card, NULL), 0);
     bench->board = hm2_board_new();

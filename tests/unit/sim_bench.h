@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* A started board on a simulated card with the firmware of a recording, in virtual time. */
+/* A started board on a simulated card, with the firmware of a recording if wanted, in virtual time. */
 #ifndef SIM_BENCH_H
 #define SIM_BENCH_H
 
@@ -17,7 +17,7 @@ struct sim_bench {
     int64_t now_ns;
 };
 
-/* firmware: of replay_firmware(). Fails the test when something does not work. */
+/* firmware: of replay_firmware(), NULL = the profile's. Fails the test when something does not work. */
 struct sim_bench *sim_bench_new(const char *profile, const char *firmware, const char *config);
 void sim_bench_free(struct sim_bench *bench);
 /* Read, write, and the rest of the period. */

@@ -6,6 +6,8 @@
 
 #include "sserial.h"
 
+#define RESOLVER_AMPLITUDE 0.9 /* of the converter's range */
+
 static int connect_encoders(const struct axes *const a, struct hm2_diag *const diag)
 {
     const struct card_options *const o = a->options;
@@ -43,11 +45,27 @@ static int connect_encoders(const struct axes *const a, struct hm2_diag *const d
     return 0;
 }
 
+static int connect_resolvers(const struct axes *const a, struct hm2_diag *const diag)
+{
+    for (unsigned i = 0; i < a->options->resolver_count; i++) {
+        const struct resolver_option *const r = &a->options->resolvers[i];
+        const struct sim_resolver resolver = {
+            .amplitude = RESOLVER_AMPLITUDE, .turns = r->turns, .turns_per_s = r->turns_per_s, .pwmgen = r->pwmgen};
+        const int err = sim_card_resolver(a->card, r->channel, &resolver);
+        if (err)
+            return hm2_diag_add(diag, err, "--resolver %u: this card has no such resolver channel or PWM generator",
+                                r->channel);
+    }
+    return 0;
+}
+
 int axes_connect(struct axes *const axes, const struct card_options *const options, struct sim_card *const card,
                  struct hm2_diag *const diag)
 {
     *axes = (struct axes){.options = options, .card = card};
-    const int err = connect_encoders(axes, diag);
+    int err = connect_encoders(axes, diag);
+    if (!err)
+        err = connect_resolvers(axes, diag);
     if (err)
         return err;
     for (unsigned i = 0; i < options->switch_count; i++) {
@@ -99,4 +117,10 @@ void axes_print(const struct axes *const axes, const char *const name)
     int64_t position;
     for (unsigned unit = 0; encoders > 0 && sim_card_turned(axes->card, HM2_GTAG_ENCODER, unit, &position) == 0; unit++)
         printf("%s: encoder %u at %" PRId64 "\n", name, unit, position);
+    for (unsigned i = 0; i < axes->options->resolver_count; i++) {
+        const unsigned channel = axes->options->resolvers[i].channel;
+        double turns;
+        if (sim_card_resolver_turns(axes->card, channel, &turns) == 0)
+            printf("%s: resolver %u at %.6f turns\n", name, channel, turns);
+    }
 }

@@ -267,6 +267,27 @@ static int add_motor(struct reading *const r, const char *const value)
     return 0;
 }
 
+/* CHANNEL:TURNS[:PWMGEN:SPEED] */
+static int add_resolver(struct reading *const r, const char *const value)
+{
+    static const char wanted[] = "CHANNEL:TURNS or CHANNEL:TURNS:PWMGEN:SPEED, turns a second at full duty";
+    struct resolver_option new = {.turns_per_s = 0};
+    unsigned long channel, pwmgen = 0;
+    const char *at;
+    if (!read_unsigned(value, UINT8_MAX, &at, &channel) || *at != ':' ||
+        !read_real(at + 1, -SIM_RESOLVER_TURNS, SIM_RESOLVER_TURNS, &at, &new.turns))
+        return refuse(r, "--resolver", value, wanted);
+    if (*at != '\0' && (*at != ':' || !read_unsigned(at + 1, UINT8_MAX, &at, &pwmgen) || *at != ':' ||
+                        !whole_real(at + 1, -SIM_RESOLVER_TURNS, SIM_RESOLVER_TURNS, &new.turns_per_s)))
+        return refuse(r, "--resolver", value, wanted);
+    if (r->card->resolver_count == MAX_WIRES)
+        return refuse(r, "--resolver", value, "at most 32 resolvers a card");
+    new.channel = (unsigned)channel;
+    new.pwmgen = (unsigned)pwmgen;
+    r->card->resolvers[r->card->resolver_count++] = new;
+    return 0;
+}
+
 /* uart.N:TARGET or pktuart.N:TARGET */
 static int add_uart(struct reading *const r, const char *const value)
 {
@@ -486,6 +507,7 @@ enum {
     OPT_WIRE,
     OPT_FOLLOW,
     OPT_MOTOR,
+    OPT_RESOLVER,
     OPT_INDEX,
     OPT_UART,
     OPT_SERVO_CARD,
@@ -522,6 +544,7 @@ static const struct option long_options[] = {
     {"wire", required_argument, NULL, OPT_WIRE},
     {"follow", required_argument, NULL, OPT_FOLLOW},
     {"motor", required_argument, NULL, OPT_MOTOR},
+    {"resolver", required_argument, NULL, OPT_RESOLVER},
     {"index", required_argument, NULL, OPT_INDEX},
     {"uart", required_argument, NULL, OPT_UART},
     {"7i65", required_argument, NULL, OPT_SERVO_CARD},
@@ -595,6 +618,8 @@ static void print_help(void)
           "  --wire FROM:TO      connect two I/O pins\n"
           "  --follow ENC:STEPGEN[:NUM/DEN]  the encoder turns with the step generator\n"
           "  --motor ENC:PWMGEN:COUNTS       the encoder turns with a motor, COUNTS a second at full duty\n"
+          "  --resolver CH:TURNS[:PWMGEN:SPEED]  a resolver, and a motor that turns it, SPEED turns a second at full "
+          "duty\n"
           "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
           "  --uart PORT:TARGET  at uart.N or pktuart.N: loop, or the path of a terminal to make\n"
           "  --7i65 PORT         a 7I65 with axes at a buffered SPI port\n"
@@ -688,6 +713,8 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_follower(r, value);
     case OPT_MOTOR:
         return add_motor(r, value);
+    case OPT_RESOLVER:
+        return add_resolver(r, value);
     case OPT_INDEX:
         return add_index(r, value);
     case OPT_UART:

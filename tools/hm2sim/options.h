@@ -36,6 +36,12 @@ struct motor {
     int32_t counts_per_s; /* at full duty */
 };
 
+/* A resolver, and a motor on its shaft when turns_per_s is not 0. */
+struct resolver_option {
+    unsigned channel, pwmgen;
+    double turns, turns_per_s;
+};
+
 /* A card at a smart-serial port. */
 struct remote_option {
     unsigned port, channel;
@@ -88,10 +94,11 @@ struct card_options {
     uint8_t mac[6];
     struct flash_options flash;
     unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count, remote_count,
-        servo_count;
+        servo_count, resolver_count;
     struct wire wires[MAX_WIRES];
     struct follower followers[MAX_WIRES];
     struct motor motors[MAX_WIRES];
+    struct resolver_option resolvers[MAX_WIRES];
     struct encoder_index indices[MAX_WIRES];
     struct position_switch switches[MAX_WIRES];
     struct pattern patterns[MAX_PATTERNS];

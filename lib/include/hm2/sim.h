@@ -119,6 +119,23 @@ HM2_API int HM2_MUST_CHECK sim_card_index(struct sim_card *card, unsigned encode
  */
 HM2_API int HM2_MUST_CHECK sim_card_turned(struct sim_card *card, uint8_t gtag, unsigned unit, int64_t *position);
 
+#define SIM_RESOLVER_TURNS 1e6
+
+/* A resolver on a channel of the resolver modules (tag C0), with a motor on its shaft that obeys a PWM generator as
+ * those of sim_card_motor() do. */
+struct sim_resolver {
+    double amplitude;   /* of its signals, in the converter's range: 0..1; 0 takes the resolver away */
+    double turns;       /* electrical turns: where it stands now */
+    double turns_per_s; /* at full duty; 0 = without a motor */
+    unsigned pwmgen;
+};
+/* HM2_ERR_NOTFOUND without such a channel or PWM generator; HM2_ERR_RANGE for impossible numbers, turns and turns a
+ * second beyond SIM_RESOLVER_TURNS among them. */
+HM2_API int HM2_MUST_CHECK sim_card_resolver(struct sim_card *card, unsigned channel,
+                                             const struct sim_resolver *resolver);
+/* Where it has been turned to. */
+HM2_API int HM2_MUST_CHECK sim_card_resolver_turns(struct sim_card *card, unsigned channel, double *turns);
+
 /* ---- serial ports ------------------------------------------------------------------------------------------------ */
 
 /* A byte has left a transmitter, up to the middle of its stop bit. */
