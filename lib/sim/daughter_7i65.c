@@ -7,7 +7,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim_card.h"
+#include "card_state.h"
+#include "motor.h"
+#include "sim_qcounter.h"
 
 #define DAC_CHANNELS 4u
 #define VOLTS        10.0
@@ -31,6 +33,8 @@ struct sim_7i65 {
     double out_volts[SIM_7I65_CHANNELS], in_volts[SIM_7I65_CHANNELS];
     unsigned channel; /* that the ADC converted for the next word */
     uint8_t enables, inputs;
+    bool driven[SIM_7I65_CHANNELS]; /* there is a motor */
+    struct sim_motor motor[SIM_7I65_CHANNELS];
 };
 
 static unsigned selected(const struct sim_7i65 *const s)
@@ -67,6 +71,16 @@ static void start_word(struct sim_7i65 *const s, const int64_t clk)
     show(s, clk);
 }
 
+/* Until clk the outputs were as they are. */
+static void turn(struct sim_7i65 *const s, const int64_t clk)
+{
+    for (unsigned i = 0; i < SIM_7I65_CHANNELS; i++) {
+        const bool enabled = s->enables >> i & 1u;
+        if (s->driven[i])
+            sim_motor_turn(&s->motor[i], enabled ? s->out_volts[i] / VOLTS : 0.0, clk, sim_clock_low_hz(s->card));
+    }
+}
+
 static void take_dac(struct sim_7i65 *const s, const unsigned chip)
 {
     const unsigned what = s->in >> 19 & 7u, channel = s->in >> 16 & 7u;
@@ -79,9 +93,10 @@ static void take_dac(struct sim_7i65 *const s, const unsigned chip)
             s->powered[chip] ? (double)(int16_t)(s->in & 0xFFFFu) / DAC_CODE : 0.0;
 }
 
-static void end_word(struct sim_7i65 *const s)
+static void end_word(struct sim_7i65 *const s, const int64_t clk)
 {
     const unsigned chip = selected(s);
+    turn(s, clk);
     if (chip == CS_DAC1 || chip == CS_DAC2) {
         take_dac(s, chip - CS_DAC1);
     } else if (chip == CS_ADC && s->bits == 16) {
@@ -105,7 +120,7 @@ static void on_edge(void *const context, const int64_t clk, const unsigned ps, c
         if (pin == PIN_FRAME && level == SIM_LOW) {
             start_word(s, clk);
         } else if (pin == PIN_FRAME) {
-            end_word(s);
+            end_word(s, clk);
         } else if (pin == PIN_SCLK && !s->level[PIN_FRAME]) {
             if (level == SIM_LOW)
                 s->in = s->in << 1 | s->level[PIN_MOSI];
@@ -166,4 +181,26 @@ void sim_7i65_set_inputs(struct sim_7i65 *const s, const uint8_t inputs)
 uint8_t sim_7i65_enables(const struct sim_7i65 *const s)
 {
     return s->enables;
+}
+
+/* For sim_follow. The daughter card has the card's edge callback. */
+static int64_t position(struct sim_card *const card, const unsigned channel)
+{
+    struct sim_7i65 *const s = card->on_edge_context;
+    turn(s, sim_now(card));
+    return sim_motor_position(&s->motor[channel]);
+}
+
+int sim_7i65_motor(struct sim_7i65 *const s, const unsigned channel, const unsigned encoder, const int32_t counts_per_s,
+                   const double time_constant_s)
+{
+    if (channel >= SIM_7I65_CHANNELS || s->driven[channel])
+        return HM2_ERR_NOTFOUND;
+    if (!sim_motor_possible(time_constant_s))
+        return HM2_ERR_RANGE;
+    s->motor[channel] = (struct sim_motor){.time_constant_s = time_constant_s, .at = sim_now(s->card)};
+    const struct sim_follow follow = {position, .unit = channel, .num = counts_per_s, .den = 1, .keeps = true};
+    const int err = sim_qc_follow(s->card, encoder, &follow);
+    s->driven[channel] = err == 0;
+    return err;
 }

@@ -35,8 +35,10 @@ void sim_qc_bank_power_up(struct sim_module *const m, struct sim_qc_bank *const 
     memset(bank->counters, 0, bank->count * sizeof(*bank->counters));
     for (unsigned i = 0; i < bank->count; i++) {
         bank->counters[i].last_edge = INT64_MIN;
-        bank->follows[i].part = bank->follows[i].seen = 0; /* what it follows starts at 0, too */
-        bank->follows[i].seen_clk = m->clk;
+        struct sim_follow *const f = &bank->follows[i];
+        f->part = 0;
+        f->seen = f->keeps ? f->position(m->card, f->unit) : 0;
+        f->seen_clk = m->clk;
     }
     bank->stamps = (struct sim_timestamp){.since = m->clk};
     sim_divider_start(&bank->stamps.divider, m->clk, 0, SIM_TSDIV_TOP_BIT);

@@ -112,6 +112,7 @@ struct sim_follow {
     int64_t (*position)(struct sim_card *card, unsigned unit); /* of what it follows; NULL = nothing */
     unsigned unit;
     int32_t num, den;
+    bool keeps;            /* its position, when the card loses its power; else it starts at 0 again */
     uint32_t index_counts; /* from index to index; 0 = it has none */
     int64_t turned;        /* counts since it follows, over power cycles */
     int64_t seen;          /* position when it was looked at last, */

@@ -1,13 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Motors whose drives take their speed from an analog output of a remote. In closed form from one change to the next.
- */
-#include <math.h>
-
+/* Motors whose drives take their speed from an analog output of a remote. */
 #include "sim_qcounter.h"
 #include "sserial_state.h"
 
-#define POSITION_ONE 4294967296.0 /* of a follower's position: a second at full speed */
-#define UNIT_SHIFT   8u           /* a follower's unit: drive, and the module's place in tags */
+#define UNIT_SHIFT 8u /* a follower's unit: drive, and the module's place in tags */
 
 static const uint8_t tags[] = {HM2_GTAG_SSERIAL, HM2_GTAG_SSERIALB};
 
@@ -18,24 +14,12 @@ static double speed_wanted(const struct sserial *const s, const struct sim_drive
     return speed;
 }
 
-static void turn(const struct sserial *const s, struct sserial_drive *const d, const double seconds)
-{
-    const double wanted = speed_wanted(s, &d->drive);
-    const double tau = d->drive.time_constant_s;
-    const double rest = tau > 0 ? exp(-seconds / tau) : 0;
-    d->turned += wanted * seconds + (d->velocity - wanted) * tau * (1 - rest);
-    d->velocity = wanted + (d->velocity - wanted) * rest;
-}
-
 void sserial_turn(struct sim_module *const m, const int64_t clk)
 {
     struct sserial *const s = m->state;
     for (unsigned i = 0; i < s->drive_count; i++) {
         struct sserial_drive *const d = &s->drives[i];
-        if (clk <= d->at)
-            continue;
-        turn(s, d, (double)(clk - d->at) / sim_clock_low_hz(m->card));
-        d->at = clk;
+        sim_motor_turn(&d->motor, speed_wanted(s, &d->drive), clk, sim_clock_low_hz(m->card));
     }
 }
 
@@ -47,7 +31,7 @@ static int64_t position(struct sim_card *const card, const unsigned unit)
         return 0;
     sserial_turn(m, m->clk);
     const struct sserial *const s = m->state;
-    return (int64_t)floor(s->drives[unit & 0xFFu].turned * POSITION_ONE);
+    return sim_motor_position(&s->drives[unit & 0xFFu].motor);
 }
 
 int sim_card_drive_motor(struct sim_card *const card, const unsigned encoder, const struct sim_drive *const drive)
@@ -58,15 +42,16 @@ int sim_card_drive_motor(struct sim_card *const card, const unsigned encoder, co
     const struct remote *const r = sim_sserial_remote(card, drive->port, drive->channel);
     if (!m || !r || remote_speed(r, drive->output, &unused))
         return HM2_ERR_NOTFOUND;
-    if (!(drive->time_constant_s >= 0) || drive->time_constant_s > 1000)
+    if (!sim_motor_possible(drive->time_constant_s))
         return HM2_ERR_RANGE;
     struct sserial *const s = m->state;
     if (s->drive_count == SSERIAL_MAX_DRIVES)
         return HM2_ERR_NOSPACE;
     const unsigned place = m->md.gtag == tags[0] ? 0 : 1;
-    s->drives[s->drive_count] = (struct sserial_drive){.drive = local, .at = m->clk};
+    s->drives[s->drive_count] =
+        (struct sserial_drive){.drive = local, .motor = {.time_constant_s = drive->time_constant_s, .at = m->clk}};
     const struct sim_follow follow = {position, .unit = place << UNIT_SHIFT | s->drive_count,
-                                      .num = drive->counts_per_s, .den = 1};
+                                      .num = drive->counts_per_s, .den = 1, .keeps = true};
     const int err = sim_qc_follow(card, encoder, &follow);
     if (!err)
         s->drive_count++;

@@ -3,6 +3,7 @@
 #ifndef SIM_SSERIAL_STATE_H
 #define SIM_SSERIAL_STATE_H
 
+#include "motor.h"
 #include "sim_card.h"
 #include "sserial.h"
 
@@ -82,8 +83,7 @@ struct sserial_port {
 
 struct sserial_drive {
     struct sim_drive drive;
-    double velocity, turned; /* of full speed, and seconds at it */
-    int64_t at;              /* clk of both */
+    struct sim_motor motor;
 };
 
 struct sserial {

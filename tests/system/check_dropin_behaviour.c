@@ -80,6 +80,8 @@ static void run_driver(const struct scenario *const scenario, const enum driver_
     struct run run = {.driver = {.kind = kind, .messages = record->messages, .messages_size = MESSAGES},
                       .record = record};
     run.driver.paced = scenario->paced;
+    run.driver.firmware = scenario->firmware;
+    run.driver.has_7i65 = scenario->has_7i65;
     run.driver.on_write = on_write;
     run.driver.context = &run;
     if (!driver_load(&run.driver, scenario->card, scenario->config))

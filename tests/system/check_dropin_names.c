@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * Name for name: LinuxCNC's driver (hostmot2 and hm2_eth) and our component are loaded into LinuxCNC, one after the
- * other, with the same card and the same config= line. Every pin, parameter, function and alias of the former must
- * exist in the latter, with the same type, direction and value; what is different is listed, with its reason, in
- * tests/data/dropin/differences.
+ * other, with the same card and the same config= line; where a 7I65 hangs at the card, so are mesa_7i65 and hm2_7i65.
+ * Every pin, parameter, function and alias of the former must exist in the latter, with the same type, direction and
+ * value; what is different is listed, with its reason, in tests/data/dropin/differences.
  */
 #include <check.h>
 #include <errno.h>
@@ -71,6 +71,8 @@ static const struct load loads[] = {
     {"7i93_svst8_8im2", "default", "", {NULL}},
     {"7i93_svst1_4_7i47s", "default", "", {NULL}},
     {"7i93_2x7i65", "default", "", {NULL}},
+    {"7i93_2x7i65", "7i65", "", {"--7i65", "0"}},
+    {"7i93_2x7i65", "second-7i65", "num_bspis=2", {"--7i65", "1"}},
     {"7i93_sv12im_2x7i48", "default", "", {NULL}},
     {"7i93_sv6_7i49", "default", "", {NULL}},
     {"7i93",
@@ -105,6 +107,7 @@ struct shared {
 static struct shared *shared;
 static struct process run;
 static char prefix[32]; /* "hm2_7i96s.0." */
+static const char servo_prefix[] = "mesa-7i65.";
 static struct listing theirs, ours;
 
 /* ---- loading ------------------------------------------------------------------------------------------------------
@@ -124,14 +127,18 @@ static void write_file(const char *const folder, const char *const name, const c
 static bool load(const struct load *const load, const char *const driver)
 {
     const bool theirs_loads = strcmp(driver, "hm2_eth") == 0;
-    char folder[256], hal[280], text[1024];
+    char folder[256], hal[280], servo[128] = "", text[1024];
     const char *skip;
     snprintf(folder, sizeof folder, "%s/dropin-names-%s-%s-%s", TEST_BUILD, load->card, load->name, driver);
     ck_assert(mkdir(folder, 0755) == 0 || errno == EEXIST);
+    if (load->options[0] && strcmp(load->options[0], "--7i65") == 0)
+        snprintf(servo, sizeof servo, "loadrt %s_7i65 bspi_chans=%sbspi.%s\n", theirs_loads ? "mesa" : "hm2", prefix,
+                 load->options[1]);
     snprintf(text, sizeof text,
-             "%sloadrt %s board_ip=192.168.1.121 config=\"%s\"\n"
-             "show pin %s\nshow param %s\nshow funct %s\nshow alias %s\n",
-             theirs_loads ? "loadrt hostmot2\n" : "", driver, load->config, prefix, prefix, prefix, prefix);
+             "%sloadrt %s board_ip=192.168.1.121 config=\"%s\"\n%s"
+             "show pin %s %s\nshow param %s %s\nshow funct %s\nshow alias %s\n",
+             theirs_loads ? "loadrt hostmot2\n" : "", driver, load->config, servo, prefix, servo_prefix, prefix,
+             servo_prefix, prefix, prefix);
     write_file(folder, "load.hal", text);
     snprintf(hal, sizeof hal, "%s/load.hal", folder);
     ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
@@ -169,6 +176,14 @@ static bool is_heading(const char *const line, const char *const heading)
     return len >= wanted && strcmp(line + len - wanted, heading) == 0;
 }
 
+/* The name without the card's prefix; NULL for what belongs to somebody else. */
+static const char *name_in_table(const char *const name)
+{
+    if (strncmp(name, servo_prefix, strlen(servo_prefix)) == 0)
+        return name;
+    return strncmp(name, prefix, strlen(prefix)) == 0 ? name + strlen(prefix) : NULL;
+}
+
 /* One line of a listing, by its heading; false for what is no object. */
 static bool parse(const char kind, const char *const line, struct object *const o)
 {
@@ -181,10 +196,9 @@ static bool parse(const char kind, const char *const line, struct object *const 
         parsed = sscanf(line, "%63s %63s", name, o->value) == 2; /* value: the original name */
     else if (kind != NO_KIND)
         parsed = sscanf(line, "%*s %7s %7s %63s %63s", o->type, o->direction, o->value, name) == 4;
-    if (!parsed || strncmp(name, prefix, strlen(prefix)) != 0)
-        return false;
-    snprintf(o->name, sizeof o->name, "%s", name + strlen(prefix));
-    return true;
+    const char *const own = parsed ? name_in_table(name) : NULL;
+    snprintf(o->name, sizeof o->name, "%s", own ? own : "");
+    return own != NULL;
 }
 
 static void read_listing(struct listing *const listing)

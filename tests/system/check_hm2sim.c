@@ -233,6 +233,8 @@ static const char *const bad_options[][3] = {
     {"--servo", "0:0:1:AnalogOut0", "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS"},
     {"--servo", "0:0:1::100", "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS"},
     {"--servo", "0:0:1:AnalogOut0:100:-1", "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS"},
+    {"--7i65-motor", "0:0", "ENCODER:OUTPUT:COUNTS"},
+    {"--7i65-motor", "0:0:100:-1", "ENCODER:OUTPUT:COUNTS"},
     {"--nonsense", NULL, "--nonsense"},
     {"stray", NULL, "not an option"},
 };
@@ -262,6 +264,7 @@ START_TEST(what_the_card_does_not_have_is_refused)
         {"--remote", "0:0=7i77", "no smart-serial port 0 channel 1"},
         {"--remote", "1:0=7i76", "no smart-serial port 1 channel 0"},
         {"--servo", "0:0:0:SpinOut:100", "no remote with such a numeric output"},
+        {"--7i65-motor", "0:0:100", "no --7i65 with such an output"},
         {"--ppmc", "/nonexistent/socket", "No such file"},
         {"--firmware", "/nonexistent.hex", "/nonexistent.hex"},
         {"--name", "seventeen letters", "a card's name of 1 to 16 characters"},

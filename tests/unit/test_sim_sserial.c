@@ -478,6 +478,21 @@ static void a_motor_runs_out_when_the_remote_is_no_longer_fed(void **state)
     assert_true(llabs(turned(rig) - there - 5000) < 200);
 }
 
+static void a_motor_stands_where_it_was_when_the_card_lost_its_power(void **state)
+{
+    const struct rig *const rig = *state;
+    const struct sim_drive drive = {0, ANALOG, "AnalogOut0", FULL_SPEED, 0};
+    assert_int_equal(sim_card_drive_motor(rig->card, 2, &drive), 0);
+    assert_int_equal(command(rig, 0x0902), 0);
+    drive_for(rig, 4095, true, 100);
+    drive_for(rig, 0, false, 10);
+    const int64_t there = turned(rig);
+    assert_true(there > 9000);
+    sim_card_power_cycle(rig->card);
+    wait(rig, 10 * MS);
+    assert_int_equal(turned(rig), there);
+}
+
 static void motors_need_an_encoder_and_an_output(void **state)
 {
     const struct rig *const rig = *state;
@@ -556,6 +571,7 @@ int main(void)
         TEST(ignored_commands_may_be_written_at_any_time),
         TEST(a_motor_turns_by_the_output_with_inertia_while_it_is_enabled),
         TEST(a_motor_runs_out_when_the_remote_is_no_longer_fed),
+        TEST(a_motor_stands_where_it_was_when_the_card_lost_its_power),
         TEST(motors_need_an_encoder_and_an_output),
         cmocka_unit_test(sserialb_has_seven_registers_a_channel_and_works_alike),
         TEST(what_cannot_be_plugged_is_refused_with_a_sentence),

@@ -38,9 +38,9 @@ static int connect_encoders(const struct axes *const a, struct hm2_diag *const d
     for (unsigned i = 0; i < o->index_count; i++) {
         const int err = sim_card_index(a->card, o->indices[i].encoder, o->indices[i].counts);
         if (err)
-            return hm2_diag_add(diag, err,
-                                "--index %u: this card has no such encoder with --follow, --motor or --servo",
-                                o->indices[i].encoder);
+            return hm2_diag_add(
+                diag, err, "--index %u: this card has no such encoder with --follow, --motor, --servo or --7i65-motor",
+                o->indices[i].encoder);
     }
     return 0;
 }
@@ -113,7 +113,8 @@ void axes_run(struct axes *const axes)
 
 void axes_print(const struct axes *const axes, const char *const name)
 {
-    const unsigned encoders = axes->options->follower_count + axes->options->motor_count + axes->options->servo_count;
+    const struct card_options *const o = axes->options;
+    const unsigned encoders = o->follower_count + o->motor_count + o->servo_count + o->servo_card_motor_count;
     int64_t position;
     for (unsigned unit = 0; encoders > 0 && sim_card_turned(axes->card, HM2_GTAG_ENCODER, unit, &position) == 0; unit++)
         printf("%s: encoder %u at %" PRId64 "\n", name, unit, position);

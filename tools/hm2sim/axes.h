@@ -12,7 +12,8 @@ struct axes {
     enum sim_level levels[MAX_WIRES]; /* to this */
 };
 
-/* Couple what the options say. On an error diag says which option this card cannot have. */
+/* Couple what the options say, when the peers with motors of their own are connected. On an error diag says which
+ * option this card cannot have. */
 int HM2_MUST_CHECK axes_connect(struct axes *axes, const struct card_options *options, struct sim_card *card,
                                 struct hm2_diag *diag);
 /* Set the pads with switches as the axes are now. */

@@ -314,6 +314,25 @@ static int set_servo_card(struct reading *const r, const char *const value)
     return 0;
 }
 
+/* ENCODER:OUTPUT:COUNTS[:MS] */
+static int add_servo_card_motor(struct reading *const r, const char *const value)
+{
+    unsigned long encoder, channel;
+    long counts;
+    double ms = 0;
+    const char *at;
+    if (!read_unsigned(value, UINT8_MAX, &at, &encoder) || *at != ':' ||
+        !read_unsigned(at + 1, UINT8_MAX, &at, &channel) || *at != ':' ||
+        !read_signed(at + 1, INT32_MAX, &at, &counts) || (*at != ':' && *at != '\0') ||
+        (*at == ':' && !whole_real(at + 1, 0, MAX_TIME_CONSTANT_MS, &ms)))
+        return refuse(r, "--7i65-motor", value, "ENCODER:OUTPUT:COUNTS[:MILLISECONDS], such as 0:0:100000:20");
+    if (r->card->servo_card_motor_count == MAX_WIRES)
+        return refuse(r, "--7i65-motor", value, "at most 32 motors a card");
+    r->card->servo_card_motors[r->card->servo_card_motor_count++] =
+        (struct servo_card_motor){(unsigned)encoder, (unsigned)channel, (int32_t)counts, ms / MS_PER_S};
+    return 0;
+}
+
 /* ENCODER:COUNTS */
 static int add_index(struct reading *const r, const char *const value)
 {
@@ -511,6 +530,7 @@ enum {
     OPT_INDEX,
     OPT_UART,
     OPT_SERVO_CARD,
+    OPT_SERVO_CARD_MOTOR,
     OPT_PPMC,
     OPT_SWITCH,
     OPT_DRIVE,
@@ -548,6 +568,7 @@ static const struct option long_options[] = {
     {"index", required_argument, NULL, OPT_INDEX},
     {"uart", required_argument, NULL, OPT_UART},
     {"7i65", required_argument, NULL, OPT_SERVO_CARD},
+    {"7i65-motor", required_argument, NULL, OPT_SERVO_CARD_MOTOR},
     {"ppmc", required_argument, NULL, OPT_PPMC},
     {"switch", required_argument, NULL, OPT_SWITCH},
     {"drive", required_argument, NULL, OPT_DRIVE},
@@ -623,6 +644,7 @@ static void print_help(void)
           "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
           "  --uart PORT:TARGET  at uart.N or pktuart.N: loop, or the path of a terminal to make\n"
           "  --7i65 PORT         a 7I65 with axes at a buffered SPI port\n"
+          "  --7i65-motor ENC:OUTPUT:COUNTS[:MS]  a motor at its output, COUNTS a second at 10 V, with a lag\n"
           "  --ppmc PATH         Pico Systems encoder boards on a socket; they count the step generators' steps\n"
           "  --switch IO:AXIS:POSITION:LEVELS  below the position of stepgen.N or encoder.N one level, then another\n"
           "  --drive IO:LEVELS[:MS]  0, 1, z (floating), h (pulled up), MS milliseconds each\n"
@@ -721,6 +743,8 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_uart(r, value);
     case OPT_SERVO_CARD:
         return set_servo_card(r, value);
+    case OPT_SERVO_CARD_MOTOR:
+        return add_servo_card_motor(r, value);
     case OPT_PPMC:
         r->card->ppmc = value;
         return 0;

@@ -56,6 +56,13 @@ struct servo {
     double time_constant_s;
 };
 
+/* The same at an output of a 7I65. */
+struct servo_card_motor {
+    unsigned encoder, channel;
+    int32_t counts_per_s;
+    double time_constant_s;
+};
+
 struct encoder_index {
     unsigned encoder;
     uint32_t counts; /* from one to the next */
@@ -107,7 +114,8 @@ struct card_options {
     unsigned uart_count;
     struct uart_option uarts[MAX_UARTS];
     bool has_servo_card; /* a 7I65 at a buffered SPI port */
-    unsigned servo_port;
+    unsigned servo_port, servo_card_motor_count;
+    struct servo_card_motor servo_card_motors[MAX_WIRES];
     const char *ppmc; /* path of the socket of its EPP bus */
 };
 

@@ -69,6 +69,27 @@ static int connect_serial(struct serial_peer *const p, const struct uart_option 
 /* ---- servo card
  * -------------------------------------------------------------------------------------------------------- */
 
+static int connect_servo_card(struct peers *const peers, const struct card_options *const o,
+                              struct hm2_diag *const diag)
+{
+    const int missing = o->has_servo_card ? sim_7i65_new(&peers->servo, peers->card, o->servo_port) : 0;
+    if (missing)
+        return hm2_diag_add(diag, missing, "--7i65 %u: the card has no such buffered SPI port", o->servo_port);
+    for (unsigned i = 0; i < o->servo_card_motor_count; i++) {
+        const struct servo_card_motor *const m = &o->servo_card_motors[i];
+        const int err = peers->servo
+                            ? sim_7i65_motor(peers->servo, m->channel, m->encoder, m->counts_per_s, m->time_constant_s)
+                            : HM2_ERR_NOTFOUND;
+        if (err)
+            return hm2_diag_add(
+                diag, err,
+                "--7i65-motor %u:%u: there is no such encoder, no --7i65 with such an output, or a motor "
+                "at it already",
+                m->encoder, m->channel);
+    }
+    return 0;
+}
+
 /* An axis at each output: its speed is the voltage, its sensor is at the input of the same number. */
 static void move_axes(struct peers *const peers, const int64_t now_ns)
 {
@@ -95,12 +116,7 @@ int peers_connect(struct peers *const peers, const struct card_options *const op
         peers->serial_count = i + 1u;
         err = connect_serial(&peers->serial[i], &options->uarts[i], card, diag);
     }
-    if (!err && options->has_servo_card) {
-        err = sim_7i65_new(&peers->servo, card, options->servo_port);
-        if (err)
-            (void)hm2_diag_add(diag, err, "--7i65 %u: the card has no such buffered SPI port", options->servo_port);
-    }
-    return err;
+    return err ? err : connect_servo_card(peers, options, diag);
 }
 
 void peers_close(struct peers *const peers)

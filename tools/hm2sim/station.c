@@ -191,9 +191,9 @@ int station_open(struct station *const s, const struct options *const options, c
     if (!err)
         err = remotes_connect(s->card, card, seed, diag);
     if (!err)
-        err = axes_connect(&s->axes, card, s->card, diag);
-    if (!err)
         err = peers_connect(&s->peers, card, s->card, diag);
+    if (!err)
+        err = axes_connect(&s->axes, card, s->card, diag);
     if (!err && card->ppmc)
         err = ppmc_open(&s->ppmc, s->card, card->ppmc, diag);
     if (!err)

@@ -162,6 +162,12 @@ HM2_API void sim_7i65_free(struct sim_7i65 *daughter); /* before the card */
 HM2_API double sim_7i65_output_volts(const struct sim_7i65 *daughter, unsigned channel);
 HM2_API void sim_7i65_set_input_volts(struct sim_7i65 *daughter, unsigned channel, double volts);
 HM2_API void sim_7i65_set_inputs(struct sim_7i65 *daughter, uint8_t inputs); /* bits 0..3 */
+/* A motor whose drive takes output `channel` for its speed while the channel is enabled, with an encoder of the card on
+ * its shaft: counts_per_s at 10 V (negative: the other way round), reached with a time constant of 0 to 1000 s.
+ * HM2_ERR_NOTFOUND when there is no such encoder or channel, or the channel has a motor, HM2_ERR_RANGE for the time.
+ * The daughter card must then live as long as the card is used. */
+HM2_API int HM2_MUST_CHECK sim_7i65_motor(struct sim_7i65 *daughter, unsigned channel, unsigned encoder,
+                                          int32_t counts_per_s, double time_constant_s);
 HM2_API uint8_t sim_7i65_enables(const struct sim_7i65 *daughter);
 
 /* ---- packets ---------------------------------------------------------------------------------------------------- */

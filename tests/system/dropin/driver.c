@@ -2,6 +2,7 @@
 #include "driver.h"
 
 #include <check.h>
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,11 +20,13 @@
 #define TASK      1
 
 static const struct {
-    const char *module, *before, *folder;
+    const char *module, *before, *servo, *folder;
 } kinds[] = {
-    [DRIVER_LINUXCNC] = {"hm2_eth", "hostmot2", DRIVER_MODULES},
-    [DRIVER_OURS] = {"hm2_lbp16", NULL, TEST_BUILD "/components"},
+    [DRIVER_LINUXCNC] = {"hm2_eth", "hostmot2", "mesa_7i65", DRIVER_MODULES},
+    [DRIVER_OURS] = {"hm2_lbp16", NULL, "hm2_7i65", TEST_BUILD "/components"},
 };
+
+static const char servo_prefix[] = "mesa-7i65.";
 
 const char *const *driver_files(const enum driver_kind kind)
 {
@@ -82,24 +85,49 @@ static bool on_send(void *const context, const uint8_t *const data, const size_t
 /* ---- points -------------------------------------------------------------------------------------------------------
  */
 
-static bool is_of_card(const struct driver *const driver, const char *const name)
+static bool begins_with(const char *const name, const char *const prefix)
 {
-    return strncmp(name, driver->prefix, strlen(driver->prefix)) == 0;
+    return strncmp(name, prefix, strlen(prefix)) == 0;
 }
 
 static void add_point(struct driver *const driver, const struct hh_named *const names, const hal_type_t type,
                       const bool settable, const volatile void *const value)
 {
-    if (is_of_card(driver, names->name))
-        driver->points[driver->point_count++] = (struct driver_point){
-            hh_shown_name(names) + strlen(driver->prefix), (int)type, settable, (volatile void *)(uintptr_t)value};
+    const bool of_card = begins_with(names->name, driver->prefix);
+    if (of_card || begins_with(names->name, servo_prefix))
+        driver->points[driver->point_count++] =
+            (struct driver_point){hh_shown_name(names) + (of_card ? strlen(driver->prefix) : 0), (int)type, settable,
+                                  (volatile void *)(uintptr_t)value};
+}
+
+/* What has arrived at the 7I65. */
+static void add_world(struct driver *const driver)
+{
+    static const char *const names[SIM_7I65_CHANNELS] = {"7i65.volts.0", "7i65.volts.1", "7i65.volts.2",
+                                                         "7i65.volts.3", "7i65.volts.4", "7i65.volts.5",
+                                                         "7i65.volts.6", "7i65.volts.7"};
+    for (unsigned i = 0; i < SIM_7I65_CHANNELS; i++)
+        driver->points[driver->point_count++] =
+            (struct driver_point){names[i], HAL_FLOAT, false, &driver->servo_volts[i]};
+    driver->points[driver->point_count++] =
+        (struct driver_point){"7i65.enables", HAL_U32, false, &driver->servo_enables};
+}
+
+static void look_at_world(struct driver *const driver)
+{
+    if (!driver->servo)
+        return;
+    sim_card_advance(driver->card, sim_card_clock_at(driver->card, sockets_now_ns()));
+    for (unsigned i = 0; i < SIM_7I65_CHANNELS; i++)
+        driver->servo_volts[i] = sim_7i65_output_volts(driver->servo, i);
+    driver->servo_enables = sim_7i65_enables(driver->servo);
 }
 
 static void collect_points(struct driver *const driver)
 {
     const struct hh *const host = hh_host();
     const struct hh_list *const pins = &host->pins.shown, *const params = &host->params.shown;
-    driver->points = calloc(pins->count + params->count, sizeof *driver->points);
+    driver->points = calloc(pins->count + params->count + SIM_7I65_CHANNELS + 1, sizeof *driver->points);
     ck_assert_ptr_nonnull(driver->points);
     for (size_t i = 0; i < pins->count; i++) {
         const struct hh_pin *const pin = pins->items[i];
@@ -109,6 +137,8 @@ static void collect_points(struct driver *const driver)
         const struct hh_param *const param = params->items[i];
         add_point(driver, &param->names, param->type, param->dir == HAL_RW, param->value);
     }
+    if (driver->servo)
+        add_world(driver);
 }
 
 const struct driver_point *driver_find(const struct driver *const driver, const char *const name)
@@ -157,12 +187,32 @@ static void open_host(struct driver *const driver)
         ck_abort_msg("no HAL host: %s", diag.text);
 }
 
+static void read_firmware(const char *const path, struct hm2_image *const image)
+{
+    static char text[65536];
+    struct hm2_diag diag = {0};
+    FILE *const file = fopen(path, "r");
+    ck_assert_msg(file, "%s: %s", path, strerror(errno));
+    const size_t len = fread(text, 1, sizeof text, file);
+    ck_assert_uint_lt(len, sizeof text);
+    fclose(file);
+    if (hm2_image_from_text(text, len, image, &diag) != 0)
+        ck_abort_msg("%s: %s", path, diag.text);
+}
+
 static void open_card(struct driver *const driver, const char *const card)
 {
-    const struct sim_card_options options = {.profile = card, .seed = 1};
+    struct hm2_image image;
+    struct sim_card_options options = {.profile = card, .seed = 1};
     struct hm2_diag diag = {0};
+    if (driver->firmware) {
+        read_firmware(driver->firmware, &image);
+        options.image = &image;
+    }
     if (sim_card_new(&driver->card, &options, &diag) != 0)
         ck_abort_msg("no card: %s", diag.text);
+    if (driver->has_7i65)
+        ck_assert_int_eq(sim_7i65_new(&driver->servo, driver->card, 0), 0);
     ck_assert_int_eq(sim_net_new(&driver->net, driver->card, NULL), 0);
     sim_card_set_instant(driver->card, !driver->paced);
     sockets_open(driver->net, on_send, driver);
@@ -184,17 +234,22 @@ static bool load(struct driver *const driver, const char *const module, const ch
 
 bool driver_load(struct driver *const driver, const char *const card, const char *const config)
 {
-    char line[512];
+    char line[512], port[64];
     const char *const arguments[] = {"board_ip=192.168.1.121", line, driver->parameter};
+    const char *const servo_arguments[] = {port};
     snprintf(line, sizeof line, "config=%s", config);
-    /* The names of 7I80DB and 7I80HD say no more than 7i80 (hal-interface 1.3). */
-    const char *const stem = strncmp(card, "7i80", 4) == 0 ? "7i80" : card;
-    snprintf(driver->prefix, sizeof driver->prefix, "hm2_%s.0.", stem);
+    /* The names of 7I80DB and 7I80HD say no more than 7i80 (hal-interface 1.3); behind an underscore is the firmware.
+     */
+    const int stem = begins_with(card, "7i80") ? 4 : (int)strcspn(card, "_");
+    snprintf(driver->prefix, sizeof driver->prefix, "hm2_%.*s.0.", stem, card);
+    snprintf(port, sizeof port, "bspi_chans=%sbspi.0", driver->prefix);
     open_host(driver);
     open_card(driver, card);
     if (kinds[driver->kind].before && !load(driver, kinds[driver->kind].before, NULL, 0))
         return false;
     if (!load(driver, kinds[driver->kind].module, arguments, driver->parameter ? 3 : 2))
+        return false;
+    if (driver->has_7i65 && !load(driver, kinds[driver->kind].servo, servo_arguments, 1))
         return false;
     collect_points(driver);
     driver->start_ns = (sockets_now_ns() / DRIVER_PERIOD_NS + 10) * DRIVER_PERIOD_NS;
@@ -208,6 +263,7 @@ void driver_unload(struct driver *const driver)
     (void)halhost_close(&diag);
     sockets_engage(false);
     sim_net_free(driver->net);
+    sim_7i65_free(driver->servo);
     sim_card_free(driver->card);
     free(driver->points);
 }
@@ -237,6 +293,7 @@ static int64_t cycle_ns(const struct driver *const driver)
 void driver_begin_cycle(struct driver *const driver)
 {
     sockets_sleep_until(cycle_ns(driver) - EVENTS_NS);
+    look_at_world(driver);
 }
 
 void driver_read(struct driver *const driver)

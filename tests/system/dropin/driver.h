@@ -19,7 +19,8 @@
 enum driver_kind { DRIVER_LINUXCNC, DRIVER_OURS };
 
 struct driver_point {
-    const char *name; /* behind the card's prefix */
+    const char *name; /* behind the card's prefix; whole when it is one of a 7I65 (mesa-7i65.0.*), or of the world
+                         outside (7i65.volts.0 to 7, 7i65.enables: what has arrived at a 7I65) */
     int type;         /* hal_type_t */
     bool settable;    /* an input pin, or a parameter that may be written */
     volatile void *value;
@@ -29,9 +30,14 @@ struct driver {
     enum driver_kind kind;
     const char *parameter; /* of the module, besides board_ip and config: "debug=1"; or NULL */
     char prefix[32];       /* "hm2_7i96s.0." */
+    const char *firmware;  /* of the card instead of the usual one: a file of tests/data; or NULL */
+    bool has_7i65;         /* at the card's first buffered SPI port, and its component is loaded, too */
     bool paced;            /* its processor takes its time, so that what is read depends on the place in the packet */
     struct sim_card *card;
     struct sim_net *net;
+    struct sim_7i65 *servo; /* NULL without */
+    double servo_volts[SIM_7I65_CHANNELS];
+    uint32_t servo_enables;
     int64_t start_ns; /* of cycle 0 */
     unsigned cycle;
     struct driver_point *points;
@@ -49,8 +55,8 @@ struct driver {
 bool driver_available(enum driver_kind kind);
 /* The files of a driver, NULL-terminated: full paths, in static storage. */
 const char *const *driver_files(enum driver_kind kind);
-/* Load. kind, parameter, paced, messages and on_write are set by the caller. False when the load failed: the messages
- * say why.
+/* Load. kind, parameter, firmware, has_7i65, paced, messages and on_write are set by the caller. False when the load
+ * failed: the messages say why.
  */
 bool driver_load(struct driver *driver, const char *card, const char *config);
 void driver_unload(struct driver *driver);

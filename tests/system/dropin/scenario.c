@@ -12,7 +12,8 @@
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
 
 enum { PIN_A = 0x01, PIN_B = 0x02, PIN_INDEX = 0x03 }; /* of encoders (register map 4.1) */
-#define EDGE_NS 5000
+#define BEHIND_MULTIPLEXER 0x40u                       /* of one encoder of a pair, see lib/sim/sim_muxed_encoder.c */
+#define EDGE_NS            5000
 
 static void set_point(const struct driver *const driver, const char *const name, const double value)
 {
@@ -124,9 +125,11 @@ bool scenario_compares(const struct scenario *const scenario, const unsigned cyc
 static void drive_encoder(const struct driver *const driver, const int64_t clk, const int encoder, const uint8_t pin,
                           const bool level)
 {
-    ck_assert_int_eq(
-        sim_card_drive_input(driver->card, clk, HM2_GTAG_ENCODER, (unsigned)encoder, pin, level ? SIM_HIGH : SIM_LOW),
-        0);
+    const bool muxed = !hm2_idrom_find(sim_card_idrom(driver->card), HM2_GTAG_ENCODER);
+    ck_assert_int_eq(sim_card_drive_input(driver->card, clk, muxed ? HM2_GTAG_MUXED_ENCODER : HM2_GTAG_ENCODER,
+                                          (unsigned)encoder, (uint8_t)(muxed ? pin | BEHIND_MULTIPLEXER : pin),
+                                          level ? SIM_HIGH : SIM_LOW),
+                     0);
 }
 
 /* Edges of a disc, after the card's present. The disc's place follows from the cycle: the same in every run. */
@@ -164,6 +167,12 @@ static bool apply_event(const struct event *const event, struct driver *const dr
         break;
     case LOSE_WRITES:
         driver->lose_writes = true;
+        break;
+    case SERVO_VOLTS:
+        sim_7i65_set_input_volts(driver->servo, (unsigned)event->a, event->b / 1000.0);
+        break;
+    case SERVO_INPUTS:
+        sim_7i65_set_inputs(driver->servo, (uint8_t)event->a);
         break;
     case POWER_CYCLE:
         sim_card_power_cycle(driver->card);

@@ -34,6 +34,8 @@ enum action {
     LOSE_REQUESTS, /* in [cycle, to) */
     LOSE_WRITES,   /* in [cycle, to) */
     NO_WRITE,      /* write() is not called in [cycle, to) */
+    SERVO_VOLTS,   /* b millivolts at analog input a of the 7I65 */
+    SERVO_INPUTS,  /* levels of the 7I65's digital inputs: a */
     POWER_CYCLE,   /* of the card, in this cycle */
 };
 
@@ -63,6 +65,8 @@ struct scenario {
     unsigned settle;
     const char *const *keeps;                 /* shell patterns, ends with NULL */
     bool paced;                               /* the card's processor takes its time */
+    const char *firmware;                     /* of the card instead of the usual one, or NULL */
+    bool has_7i65;                            /* at the card's first buffered SPI port */
     struct milestone reached[MAX_MILESTONES]; /* ends with a point NULL, or when full */
 };
 

@@ -327,6 +327,38 @@ static const struct event servo_events[] = {
     {100, 500, TURN, 7, -3, 0, 0}, {500, 1500, TURN, 6, 1, 0, 0},
 };
 
+/* ---- a 7I65: analog outputs, inputs, enables, and its multiplexed encoders */
+
+#define ANALOG(n, shape, amplitude, offset, period)                                 \
+    {                                                                               \
+        "mesa-7i65.0.analogue." n ".out", shape, amplitude, offset, period, 0, 1200 \
+    }
+
+static const struct setting octal_settings[] = {
+    {0, "watchdog.timeout_ns", 20000000}, {0, "encoder.00.scale", 4000},        {0, "encoder.07.scale", -100},
+    {20, "mesa-7i65.0.enable.0.out", 1},  {20, "mesa-7i65.0.enable.3.out", 1},  {25, "mesa-7i65.0.enable.7.out", 1},
+    {40, "mesa-7i65.0.enable.3.out", 0},  {100, "mesa-7i65.0.scale-1", 5},      {100, "mesa-7i65.0.scale-2", -7.5},
+    {100, "mesa-7i65.0.scale-3", 0},      {100, "mesa-7i65.0.scale-4", 12}, /* clamped */
+    {100, "mesa-7i65.0.scale-5", -40},                                      /* clamped */
+    {200, "mesa-7i65.0.is-bipolar-0", 0}, {200, "mesa-7i65.0.is-bipolar-2", 0}, {300, "mesa-7i65.0.is-bipolar-0", 1},
+    {400, "encoder.07.index-enable", 1},  {600, "encoder.15.reset", 1},         {610, "encoder.15.reset", 0},
+};
+
+static const struct wave octal_waves[] = {
+    ANALOG("0", WAVE_SINE, 1, 0, 200),       ANALOG("1", WAVE_TRIANGLE, 1, 0, 300),
+    ANALOG("2", WAVE_SINE, 0.9, 0.05, 170),  ANALOG("3", WAVE_SQUARE, 0.5, 0.1, 50),
+    ANALOG("4", WAVE_SINE, 1.5, 0, 250),     ANALOG("5", WAVE_TRAPEZOID, 1, 0, 400),
+    ANALOG("6", WAVE_RAMP, 2.5, -1.25, 500), ANALOG("7", WAVE_SQUARE, 1, 0, 14),
+};
+
+static const struct event octal_events[] = {
+    {50, 0, SERVO_VOLTS, 0, 5000, 0, 0},   {60, 0, SERVO_VOLTS, 1, 9990, 0, 0}, {70, 0, SERVO_VOLTS, 2, 1, 0, 0},
+    {80, 0, SERVO_VOLTS, 7, 2500, 0, 0},   {90, 0, SERVO_INPUTS, 0x5, 0, 0, 0}, {150, 0, SERVO_INPUTS, 0xA, 0, 0, 0},
+    {300, 0, SERVO_VOLTS, 4, -2500, 0, 0}, {350, 0, SERVO_VOLTS, 4, 0, 0, 0},   {50, 700, TURN, 0, 3, 0, 0},
+    {100, 900, TURN, 7, -2, 0, 0},         {420, 0, INDEX, 7, 1, 0, 0},         {422, 0, INDEX, 7, 0, 0, 0},
+    {200, 1000, TURN, 15, 1, 0, 0},
+};
+
 /* ---- the same for a card with nothing but ports, whose pads are driven, too */
 
 static const struct setting ports_settings[] = {
@@ -398,6 +430,11 @@ const struct scenario scenarios[] = {
     SCENARIO(settings, "7i96s", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
     SCENARIO(settings, "7i93", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
     SCENARIO(ports, "7i80hd-16", "", 1280, .settle = 64, .keeps = settings_keeps, .reached = {{"gpio.071.in", 1}}),
+    SCENARIO(octal, "7i93_2x7i65", "", 1200, .has_7i65 = true,
+             .reached = {{"7i65.volts.0", 9.99},
+                         {"7i65.enables", 0x89},
+                         {"encoder.00.count", 1900},
+                         {"mesa-7i65.0.digital.3.in", 1}}),
     SCENARIO(paced, "7i96s", "", 2000, .paced = true, .reached = {{"encoder.00.count", 15000}}),
 };
 const size_t scenario_count = COUNT(scenarios);
