@@ -3,10 +3,8 @@
 
 #include <arpa/inet.h>
 #include <ctype.h>
-#include <errno.h>
 #include <getopt.h>
 #include <limits.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,6 +12,7 @@
 #include <hm2/lbp16.h>
 
 #include "sserial.h"
+#include "words.h"
 
 #define NS_PER_S              1e9
 #define NS_PER_MS             1e6
@@ -24,42 +23,6 @@
 #define MAX_PATTERN_PERIOD_MS 1e6
 #define MAX_TIME_CONSTANT_MS  1e5
 #define MS_PER_S              1e3
-
-/* ---- numbers ------------------------------------------------------------------------------------------------------
- */
-
-static bool read_unsigned(const char *const text, const unsigned long max, const char **const end,
-                          unsigned long *const value)
-{
-    if (*text < '0' || *text > '9')
-        return false;
-    char *stop;
-    errno = 0;
-    *value = strtoul(text, &stop, 10);
-    *end = stop;
-    return errno == 0 && *value <= max;
-}
-
-static bool whole_unsigned(const char *const text, const unsigned long max, unsigned long *const value)
-{
-    const char *end;
-    return read_unsigned(text, max, &end, value) && *end == '\0';
-}
-
-static bool read_real(const char *const text, const double min, const double max, const char **const end,
-                      double *const value)
-{
-    char *stop;
-    *value = strtod(text, &stop);
-    *end = stop;
-    return stop != text && isfinite(*value) && *value >= min && *value <= max;
-}
-
-static bool whole_real(const char *const text, const double min, const double max, double *const value)
-{
-    const char *end;
-    return read_real(text, min, max, &end, value) && *end == '\0';
-}
 
 /* ---- single options -----------------------------------------------------------------------------------------------
  */
@@ -195,22 +158,6 @@ static int add_wire(struct reading *const r, const char *const value)
     return 0;
 }
 
-static bool read_ratio(const char *const text, struct follower *const f)
-{
-    unsigned long num, den = 1;
-    const char *end;
-    const bool backwards = *text == '-';
-    if (!read_unsigned(text + backwards, INT32_MAX, &end, &num))
-        return false;
-    if (*end == '/' && (!whole_unsigned(end + 1, INT32_MAX, &den) || den == 0))
-        return false;
-    if (*end != '/' && *end != '\0')
-        return false;
-    f->num = backwards ? -(int32_t)num : (int32_t)num;
-    f->den = (int32_t)den;
-    return true;
-}
-
 static int add_follower(struct reading *const r, const char *const value)
 {
     static const char wanted[] = "ENCODER:STEPGEN or ENCODER:STEPGEN:NUM/DEN";
@@ -220,7 +167,7 @@ static int add_follower(struct reading *const r, const char *const value)
     if (!read_unsigned(value, UINT8_MAX, &end, &encoder) || *end != ':' ||
         !read_unsigned(end + 1, UINT8_MAX, &end, &stepgen))
         return refuse(r, "--follow", value, wanted);
-    if (*end != '\0' && (*end != ':' || !read_ratio(end + 1, &f)))
+    if (*end != '\0' && (*end != ':' || !read_ratio(end + 1, &end, &f.num, &f.den) || *end != '\0'))
         return refuse(r, "--follow", value, wanted);
     if (r->card->follower_count == MAX_WIRES)
         return refuse(r, "--follow", value, "at most 32 followers a card");
@@ -238,16 +185,6 @@ bool options_level(const char letter, enum sim_level *const level)
     if (!at)
         return false;
     *level = levels[at - letters];
-    return true;
-}
-
-static bool read_signed(const char *const text, const long max, const char **const end, long *const value)
-{
-    unsigned long size;
-    const bool negative = *text == '-';
-    if (!read_unsigned(text + negative, (unsigned long)max, end, &size))
-        return false;
-    *value = negative ? -(long)size : (long)size;
     return true;
 }
 
@@ -293,6 +230,14 @@ static int set_servo_card(struct reading *const r, const char *const value)
     return 0;
 }
 
+/* READER:KEY=VALUE,... */
+static int add_absolute(struct reading *const r, const char *const value)
+{
+    if (r->card->absolute_count == MAX_ABSOLUTES)
+        return refuse(r, "--absolute", value, "at most 32 absolute encoders a card");
+    return absolute_option(value, &r->card->absolutes[r->card->absolute_count++], &r->diag);
+}
+
 /* ENCODER:COUNTS */
 static int add_index(struct reading *const r, const char *const value)
 {
@@ -307,25 +252,6 @@ static int add_index(struct reading *const r, const char *const value)
     return 0;
 }
 
-/* "stepgen.N" or "encoder.N" */
-static bool read_axis(const char *const text, const char **const end, struct position_switch *const s)
-{
-    static const struct {
-        const char *name;
-        uint8_t gtag;
-    } kinds[] = {{"stepgen.", HM2_GTAG_STEPGEN}, {"encoder.", HM2_GTAG_ENCODER}};
-    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
-        const size_t len = strlen(kinds[i].name);
-        unsigned long unit;
-        if (strncmp(text, kinds[i].name, len) != 0 || !read_unsigned(text + len, UINT8_MAX, end, &unit))
-            continue;
-        s->gtag = kinds[i].gtag;
-        s->unit = (unsigned)unit;
-        return true;
-    }
-    return false;
-}
-
 /* IO:AXIS:POSITION:LEVELS */
 static int add_switch(struct reading *const r, const char *const value)
 {
@@ -333,8 +259,8 @@ static int add_switch(struct reading *const r, const char *const value)
     unsigned long io;
     long position;
     const char *at;
-    if (!read_unsigned(value, HM2_MAX_PINS, &at, &io) || *at != ':' || !read_axis(at + 1, &at, &s) || *at != ':' ||
-        !read_signed(at + 1, INT32_MAX, &at, &position) || *at != ':' || strlen(at + 1) != 2 ||
+    if (!read_unsigned(value, HM2_MAX_PINS, &at, &io) || *at != ':' || !read_axis(at + 1, &at, &s.gtag, &s.unit) ||
+        *at != ':' || !read_signed(at + 1, INT32_MAX, &at, &position) || *at != ':' || strlen(at + 1) != 2 ||
         !options_level(at[1], &s.below) || !options_level(at[2], &s.above))
         return refuse(r, "--switch", value,
                       "IO:AXIS:POSITION:LEVELS, an axis such as stepgen.0 or encoder.0, and two of the levels 0, 1, z, "
@@ -487,6 +413,7 @@ enum {
     OPT_FOLLOW,
     OPT_MOTOR,
     OPT_INDEX,
+    OPT_ABSOLUTE,
     OPT_UART,
     OPT_SERVO_CARD,
     OPT_PPMC,
@@ -523,6 +450,7 @@ static const struct option long_options[] = {
     {"follow", required_argument, NULL, OPT_FOLLOW},
     {"motor", required_argument, NULL, OPT_MOTOR},
     {"index", required_argument, NULL, OPT_INDEX},
+    {"absolute", required_argument, NULL, OPT_ABSOLUTE},
     {"uart", required_argument, NULL, OPT_UART},
     {"7i65", required_argument, NULL, OPT_SERVO_CARD},
     {"ppmc", required_argument, NULL, OPT_PPMC},
@@ -596,6 +524,10 @@ static void print_help(void)
           "  --follow ENC:STEPGEN[:NUM/DEN]  the encoder turns with the step generator\n"
           "  --motor ENC:PWMGEN:COUNTS       the encoder turns with a motor, COUNTS a second at full duty\n"
           "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
+          "  --absolute READER:LIST          an absolute encoder at ssi.N, biss.N or fanuc.N. Keys, by commas: bits=,\n"
+          "                      value=HEX, position=AT:WIDTH[g], turns=AT:WIDTH[g], start=, speed=, "
+          "with=AXIS[:NUM/DEN],\n"
+          "                      delay=NS, idle=NS, processing=CLOCKS\n"
           "  --uart PORT:TARGET  at uart.N or pktuart.N: loop, or the path of a terminal to make\n"
           "  --7i65 PORT         a 7I65 with axes at a buffered SPI port\n"
           "  --ppmc PATH         Pico Systems encoder boards on a socket; they count the step generators' steps\n"
@@ -690,6 +622,8 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_motor(r, value);
     case OPT_INDEX:
         return add_index(r, value);
+    case OPT_ABSOLUTE:
+        return add_absolute(r, value);
     case OPT_UART:
         return add_uart(r, value);
     case OPT_SERVO_CARD:

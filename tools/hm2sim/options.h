@@ -9,6 +9,7 @@
 
 #include <hm2/sim.h>
 
+#include "absolutes.h"
 #include "flash.h"
 
 #define MAX_CARDS    32u
@@ -97,6 +98,8 @@ struct card_options {
     struct pattern patterns[MAX_PATTERNS];
     struct remote_option remotes[MAX_REMOTES];
     struct servo servos[MAX_WIRES];
+    unsigned absolute_count;
+    struct absolute_encoder absolutes[MAX_ABSOLUTES];
     unsigned uart_count;
     struct uart_option uarts[MAX_UARTS];
     bool has_servo_card; /* a 7I65 at a buffered SPI port */

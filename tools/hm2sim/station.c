@@ -76,6 +76,7 @@ void station_receive(struct station *const s, const int64_t now_ns)
     s->requests++;
     drive_patterns(s, now_ns); /* what was due before it came has happened, whichever the loop looked at first */
     press_switches(s, now_ns);
+    absolutes_run(&s->absolutes, now_ns);
     peers_run(&s->peers, now_ns);
     sim_net_arrive(s->net, now_ns, client_number(&from), data, (size_t)len);
 }
@@ -85,6 +86,7 @@ void station_run(struct station *const s, const int64_t now_ns)
     drive_patterns(s, now_ns);
     sim_net_sleep_until(s->net, now_ns);
     press_switches(s, now_ns);
+    absolutes_run(&s->absolutes, now_ns);
     peers_run(&s->peers, now_ns);
     ppmc_turn(&s->ppmc, now_ns);
 }
@@ -105,7 +107,7 @@ int64_t station_next_ns(const struct station *const s)
         const int64_t step_ns = link_now_ns(sim_net_link(s->net)) + WIRED_STEP_NS;
         next_ns = step_ns < next_ns ? step_ns : next_ns;
     }
-    if (peers_exist(&s->peers)) {
+    if (peers_exist(&s->peers) || absolutes_move(&s->absolutes)) {
         const int64_t step_ns = link_now_ns(sim_net_link(s->net)) + PEER_STEP_NS;
         next_ns = step_ns < next_ns ? step_ns : next_ns;
     }
@@ -200,6 +202,8 @@ int station_open(struct station *const s, const struct options *const options, c
         err = remotes_connect(s->card, card, seed, diag);
     if (!err)
         err = axes_connect(&s->axes, card, s->card, diag);
+    if (!err)
+        err = absolutes_connect(&s->absolutes, s->card, card->absolutes, card->absolute_count, diag);
     if (!err)
         err = peers_connect(&s->peers, card, s->card, diag);
     if (!err && card->ppmc)
