@@ -108,7 +108,7 @@ int main(void)
     Suite *const suite = suite_create("absolute");
     TCase *const tests = tcase_create("absolute");
     tcase_set_timeout(tests, 120);
-    tcase_add_test(tests, fields_of_all_three_kinds_are_on_pins);
+    tcase_add_loop_test(tests, fields_of_all_three_kinds_are_on_pins, 0, 2);
     tcase_add_test(tests, an_encoder_is_changed_and_taken_away_by_command);
     tcase_add_test(tests, an_encoder_turns_by_itself);
     tcase_add_test(tests, an_encoder_turns_with_a_step_generator);

@@ -229,6 +229,7 @@ static const char *const bad_options[][3] = {
     {"--servo", "0:0:1:AnalogOut0", "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS"},
     {"--servo", "0:0:1::100", "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS"},
     {"--servo", "0:0:1:AnalogOut0:100:-1", "ENCODER:PORT:CHANNEL:OUTPUT:COUNTS"},
+    {"--sources", "2022", "2021 or later"},
     {"--absolute", "ssi.0", "expected ssi.N"},
     {"--absolute", "ssi.0:value=1", "bits=1..128"},
     {"--absolute", "ssi.0:bits=129", "bits=1..128"},

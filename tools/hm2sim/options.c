@@ -408,6 +408,7 @@ enum {
     OPT_SEED,
     OPT_FIRMWARE,
     OPT_NAME,
+    OPT_SOURCES,
     OPT_FAULTS,
     OPT_WIRE,
     OPT_FOLLOW,
@@ -444,6 +445,7 @@ static const struct option long_options[] = {
     {"port", required_argument, NULL, OPT_PORT},
     {"seed", required_argument, NULL, OPT_SEED},
     {"firmware", required_argument, NULL, OPT_FIRMWARE},
+    {"sources", required_argument, NULL, OPT_SOURCES},
     {"name", required_argument, NULL, OPT_NAME},
     {"faults", required_argument, NULL, OPT_FAULTS},
     {"wire", required_argument, NULL, OPT_WIRE},
@@ -513,6 +515,7 @@ static void print_help(void)
           "\n"
           "of the card named last, or of every card when before the first --card:\n"
           "  --firmware FILE     image as text, lines of ADDRESS VALUE in hexadecimal\n"
+          "  --sources NAME      of its modules where generations differ without the image saying so: 2021 or later\n"
           "  --name NAME         card name that it reports, in place of its type's\n"
           "  --mac XX:XX:XX:XX:XX:XX\n"
           "  --flash FILE        keep the configuration flash in a file\n"
@@ -603,6 +606,15 @@ static int take_flash_option(struct reading *const r, const int option, const ch
     }
 }
 
+static int set_sources(struct reading *const r, const char *const value)
+{
+    const bool later = strcmp(value, "later") == 0;
+    if (!later && strcmp(value, "2021") != 0)
+        return refuse(r, "--sources", value, "2021 or later");
+    r->card->sources = later ? SIM_SOURCES_LATER : SIM_SOURCES_2021;
+    return 0;
+}
+
 static int take_card_option(struct reading *const r, const int option, const char *const value)
 {
     switch (option) {
@@ -612,6 +624,8 @@ static int take_card_option(struct reading *const r, const int option, const cha
     case OPT_NAME:
         r->card->name = value;
         return 0;
+    case OPT_SOURCES:
+        return set_sources(r, value);
     case OPT_MAC:
         return set_mac(r, value);
     case OPT_WIRE:

@@ -85,6 +85,7 @@ struct card_options {
     struct in_addr address;
     uint16_t port;
     const char *firmware; /* file */
+    enum sim_sources sources;
     const char *name;     /* that the card reports, or NULL */
     uint8_t mac[6];
     struct flash_options flash;

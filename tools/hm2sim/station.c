@@ -141,7 +141,8 @@ static int make_card(struct station *const s, const uint64_t seed, struct hm2_di
 {
     const struct card_options *const o = s->options;
     struct hm2_image image;
-    struct sim_card_options options = {.profile = o->type, .card_name = o->name, .seed = seed, .flash_id = o->flash.id};
+    struct sim_card_options options = {
+        .profile = o->type, .card_name = o->name, .seed = seed, .flash_id = o->flash.id, .sources = o->sources};
     memcpy(options.mac, o->mac, sizeof options.mac);
     memcpy(options.ip, &o->address.s_addr, sizeof options.ip);
     if (o->firmware) {
