@@ -11,6 +11,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "faults.h"
 #include "remotes.h"
 
 #define MAX_WORDS    6u
@@ -48,7 +49,7 @@ static void do_faults(const struct command *const c)
 {
     struct hm2_diag diag = {0};
     struct sim_faults faults = {.seed = 0};
-    if (options_faults(c->words[1], &faults, &diag)) {
+    if (faults_option(c->words[1], &faults, &diag)) {
         snprintf(c->reply, CONTROL_REPLY_SIZE, "error: %.1000s", diag.text);
         return;
     }

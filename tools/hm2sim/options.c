@@ -11,12 +11,12 @@
 
 #include <hm2/lbp16.h>
 
+#include "faults.h"
 #include "sserial.h"
 #include "words.h"
 
 #define NS_PER_S              1e9
 #define NS_PER_MS             1e6
-#define NS_PER_US             1e3
 #define MAX_SECONDS           1e6
 #define DEFAULT_PRIORITY      50
 #define ADDRESS_CHARACTERS    32
@@ -350,54 +350,6 @@ static int add_servo(struct reading *const r, const char *const value)
     return 0;
 }
 
-/* ---- faults -------------------------------------------------------------------------------------------------------
- */
-
-/* "US" or "US-US" */
-static bool read_delay(const char *const text, const char **const end, struct sim_faults *const faults)
-{
-    double min, max;
-    if (!read_real(text, 0, 1e6, end, &min))
-        return false;
-    max = min;
-    if (**end == '-' && !read_real(*end + 1, min, 1e6, end, &max))
-        return false;
-    faults->delay_min_ns = (int64_t)(min * NS_PER_US);
-    faults->delay_max_ns = (int64_t)(max * NS_PER_US);
-    return true;
-}
-
-int options_faults(const char *text, struct sim_faults *const faults, struct hm2_diag *const diag)
-{
-    static const char wanted[] =
-        "loss, dup, reorder, truncate, foreign = 0..1 and delay = MICROSECONDS[-MICROSECONDS], "
-        "separated by commas, or none";
-    struct sim_faults f = {.seed = faults->seed};
-    const struct {
-        const char *name;
-        double *probability;
-    } names[] = {{"loss=", &f.loss},
-                 {"dup=", &f.duplicate},
-                 {"reorder=", &f.reorder},
-                 {"truncate=", &f.truncate},
-                 {"foreign=", &f.foreign}};
-    const char *const all = text;
-    if (strcmp(text, "none") == 0)
-        text = "";
-    while (*text) {
-        const char *end = NULL;
-        bool good = strncmp(text, "delay=", 6) == 0 && read_delay(text + 6, &end, &f);
-        for (size_t i = 0; i < sizeof names / sizeof names[0] && !good; i++)
-            good = strncmp(text, names[i].name, strlen(names[i].name)) == 0 &&
-                   read_real(text + strlen(names[i].name), 0, 1, &end, names[i].probability);
-        if (!good || (*end != '\0' && (*end != ',' || end[1] == '\0')))
-            return hm2_diag_add(diag, HM2_ERR_INVALID, "faults \"%s\": expected %s", all, wanted);
-        text = *end ? end + 1 : end;
-    }
-    *faults = f;
-    return 0;
-}
-
 /* ---- the command line ---------------------------------------------------------------------------------------------
  */
 
@@ -503,7 +455,8 @@ static void print_help(void)
     fputs("  --bind ADDRESS      of cards that give none (127.0.0.1)\n"
           "  --port PORT         of cards that give none (27181; 0 = any free one)\n"
           "  --seed N            of faults and MAC addresses (1)\n"
-          "  --faults LIST       loss=, dup=, reorder=, truncate=, foreign= 0..1, delay=US[-US]; by commas\n"
+          "  --faults LIST       loss=, dup=, reorder=, truncate=, foreign= 0..1, delay=US[-US], tail=0..1:US,\n"
+          "                      coalesce=US, sleep=US:US, busy=US:US; by commas\n"
           "  --latency           replies take the time that a card takes\n"
           "  --realtime[=PRIO]   SCHED_FIFO (priority 50) and locked memory, where permitted\n"
           "  --run SECONDS       end after this time\n"
@@ -673,7 +626,7 @@ static int take(struct reading *const r, const int option, const char *const val
     case OPT_SERIAL:
         return add_serial(r, value);
     case OPT_FAULTS:
-        return options_faults(value, &o->faults, &r->diag);
+        return faults_option(value, &o->faults, &r->diag);
     case OPT_LATENCY:
         o->latency = true;
         return 0;

@@ -86,7 +86,7 @@ struct card_options {
     uint16_t port;
     const char *firmware; /* file */
     enum sim_sources sources;
-    const char *name;     /* that the card reports, or NULL */
+    const char *name; /* that the card reports, or NULL */
     uint8_t mac[6];
     struct flash_options flash;
     unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count, remote_count,
@@ -133,9 +133,6 @@ enum options_result { OPTIONS_RUN, OPTIONS_EXIT_OK, OPTIONS_EXIT_USAGE };
 /* Reads the command line. Help, version and complaints have been printed when the result is not OPTIONS_RUN. */
 enum options_result options_read(struct options *options, int argc, char **argv);
 
-/* "loss=0.05,dup=0.02,delay=100-300": 0, or an error with a sentence in diag. Faults that are not named become 0;
- * "none" is all of them 0. The seed is left alone. */
-int options_faults(const char *text, struct sim_faults *faults, struct hm2_diag *diag);
 /* "0", "1", "z" (floating), "h" (pulled up). */
 bool options_level(char letter, enum sim_level *level);
 
