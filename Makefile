@@ -239,6 +239,8 @@ $(BUILDDIR)/unit/%: $(BUILDDIR)/obj/tests/unit/%.o $(call obj,$(UNIT_HELPERS)) $
 	@mkdir -p $(@D)
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) $(HOST_A) $(LIB_A) \
 		$(CMOCKA_LIBS) -lm -lpthread -ldl
+$(BUILDDIR)/unit/test_example: $(call obj,$(wildcard tests/example/*.c))
+$(BUILDDIR)/unit/test_doctor: $(call obj,$(addprefix tools/hm2doctor/,findings.c measure.c rounds.c))
 
 $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPERS)) $(SIM_A) $(LIB_A)
 	@mkdir -p $(@D)

@@ -26,9 +26,17 @@ void sim_abs_attach(struct sim_abs_encoder *const e, const struct sim_absolute *
         sim_abs_power_up(e, idle_level);
 }
 
-static bool value_bit(const struct sim_absolute *const spec, const unsigned bit)
+/* A transfer begins. */
+static void begin(struct sim_abs_encoder *const e)
 {
-    return bit < spec->bits && (spec->value[bit / 32] >> bit % 32 & 1u);
+    e->busy = true;
+    e->edges = 0;
+    memcpy(e->value, e->spec.value, sizeof e->value);
+}
+
+static bool value_bit(const struct sim_abs_encoder *const e, const unsigned bit)
+{
+    return bit < e->spec.bits && (e->value[bit / 32] >> bit % 32 & 1u);
 }
 
 static void change(struct sim_abs_encoder *const e, const int64_t at_ps, const bool level)
@@ -41,9 +49,9 @@ static void change(struct sim_abs_encoder *const e, const int64_t at_ps, const b
 }
 
 /* Most significant bit first; behind the last bit the line is low. */
-static bool nth_bit(const struct sim_absolute *const spec, const unsigned n)
+static bool nth_bit(const struct sim_abs_encoder *const e, const unsigned n)
 {
-    return n < spec->bits && value_bit(spec, spec->bits - 1u - n);
+    return n < e->spec.bits && value_bit(e, e->spec.bits - 1u - n);
 }
 
 void sim_abs_ssi_clock(struct sim_abs_encoder *const e, const bool rising, const int64_t now_ps)
@@ -53,22 +61,19 @@ void sim_abs_ssi_clock(struct sim_abs_encoder *const e, const bool rising, const
     if (!e->busy) {
         if (rising)
             return;
-        e->busy = true;
-        e->edges = 0;
+        begin(e);
     }
     e->idle_at_ps = now_ps + e->spec.idle_ps;
     if (rising)
-        change(e, now_ps + e->spec.delay_ps, nth_bit(&e->spec, e->edges++));
+        change(e, now_ps + e->spec.delay_ps, nth_bit(e, e->edges++));
 }
 
 void sim_abs_biss_clock(struct sim_abs_encoder *const e, const bool rising, const int64_t now_ps)
 {
     if (e->spec.bits == 0)
         return;
-    if (!e->busy) {
-        e->busy = true;
-        e->edges = 0;
-    }
+    if (!e->busy)
+        begin(e);
     e->idle_at_ps = now_ps + e->spec.idle_ps + e->spec.delay_ps;
     if (!rising)
         return;
@@ -79,7 +84,7 @@ void sim_abs_biss_clock(struct sim_abs_encoder *const e, const bool rising, cons
     else if (edge == start)
         change(e, now_ps + e->spec.delay_ps, true);
     else if (edge > start) /* a low bit, then the data */
-        change(e, now_ps + e->spec.delay_ps, edge > start + 1u && nth_bit(&e->spec, edge - start - 2u));
+        change(e, now_ps + e->spec.delay_ps, edge > start + 1u && nth_bit(e, edge - start - 2u));
 }
 
 /* The answer is longer than the list of changes holds: its bits are computed when they are looked at. */
@@ -87,7 +92,7 @@ void sim_abs_fanuc_request(struct sim_abs_encoder *const e, const int64_t now_ps
 {
     if (e->spec.bits == 0 || e->busy)
         return;
-    e->busy = true;
+    begin(e);
     e->idle_at_ps = now_ps + e->spec.delay_ps; /* here: when the start bit begins */
 }
 
@@ -98,7 +103,7 @@ static bool fanuc_line(struct sim_abs_encoder *const e, const int64_t now_ps)
         return false;
     const int64_t n = (since_ps - 1) / e->spec.bit_ps; /* 0 = start bit */
     if (n <= (int64_t)FANUC_BITS)
-        return n == 0 || !value_bit(&e->spec, (unsigned)n - 1u); /* least significant first, inverted */
+        return n == 0 || !value_bit(e, (unsigned)n - 1u); /* least significant first, inverted */
     e->busy = false;
     return false;
 }

@@ -14,6 +14,7 @@
 struct sim_abs_encoder {
     struct sim_absolute spec; /* bits 0: none, the line is what pads make it */
     bool level, busy;         /* of the line; busy: not back to idle */
+    uint32_t value[4];        /* what it sends in this transfer: an encoder that moves does not change its mind */
     unsigned edges;           /* rising edges of the clock in this transfer */
     int64_t idle_at_ps;
     unsigned first, count;

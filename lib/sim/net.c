@@ -32,6 +32,8 @@ struct sim_net {
     struct sim_faults faults;
     uint64_t random;
     int64_t now_ns;
+    int64_t line_ns;    /* the last datagram was on the line */
+    int64_t told_ns[2]; /* when the client's port tells next: the timer runs from told_ns[0] to [1] */
     bool frozen, instant;
     uint64_t client; /* of the datagram that is being carried */
     sim_net_deliver_fn deliver;
@@ -67,6 +69,44 @@ static int64_t draw_delay(struct sim_net *const net)
     const int64_t delay_ns = net->faults.delay_min_ns + (int64_t)sim_prng_below(&net->random, span);
     /* Without a tail nothing is drawn for it: seeds keep what they give. */
     return net->faults.tail > 0.0 && happens(net, net->faults.tail) ? delay_ns + net->faults.tail_ns : delay_ns;
+}
+
+/* Others have the line in one stretch of each busy_every_ns, which follows from the seed and the time alone. */
+static int64_t behind_neighbours(const struct sim_net *const net, const int64_t at_ns)
+{
+    const struct sim_faults *const f = &net->faults;
+    if (f->busy_ns == 0)
+        return at_ns;
+    const int64_t turn = at_ns / f->busy_every_ns;
+    uint64_t seed = f->seed + (uint64_t)turn;
+    const int64_t from_ns =
+        turn * f->busy_every_ns + (int64_t)sim_prng_below(&seed, (uint64_t)(f->busy_every_ns - f->busy_ns) + 1);
+    return at_ns >= from_ns && at_ns < from_ns + f->busy_ns ? from_ns + f->busy_ns : at_ns;
+}
+
+/* The first datagram that comes starts the timer of the client's port; it and all up to then are told of at its end. */
+static int64_t coalesced(struct sim_net *const net, const int64_t at_ns)
+{
+    if (net->faults.coalesce_ns == 0)
+        return at_ns;
+    if (at_ns < net->told_ns[0] || at_ns >= net->told_ns[1]) {
+        net->told_ns[0] = at_ns;
+        net->told_ns[1] = at_ns + net->faults.coalesce_ns;
+    }
+    return net->told_ns[1];
+}
+
+/* When a datagram that is sent at at_ns is there. */
+static int64_t arrival(struct sim_net *const net, const enum direction direction, const int64_t at_ns)
+{
+    const struct sim_faults *const f = &net->faults;
+    int64_t ns = at_ns + draw_delay(net);
+    if (f->wake_ns > 0 && at_ns - net->line_ns > f->sleep_ns)
+        ns += f->wake_ns;
+    ns = behind_neighbours(net, ns);
+    if (ns > net->line_ns)
+        net->line_ns = ns;
+    return direction == TO_CLIENT ? coalesced(net, ns) : ns;
 }
 
 static struct datagram *enqueue(struct sim_net *const net, const enum direction direction, const int64_t due_ns,
@@ -108,7 +148,7 @@ static void send_foreign(struct sim_net *const net, const enum direction directi
     uint8_t noise[64];
     for (size_t i = 0; i < sizeof noise; i++)
         noise[i] = (uint8_t)sim_prng_next(&net->random);
-    const int64_t due_ns = at_ns + draw_delay(net);
+    const int64_t due_ns = arrival(net, direction, at_ns);
     struct datagram *const d = direction == TO_CARD ? enqueue(net, direction, due_ns, request, sizeof request)
                                                     : enqueue(net, direction, due_ns, noise, sizeof noise);
     if (!d)
@@ -126,7 +166,7 @@ static void carry(struct sim_net *const net, const enum direction direction, con
     net->number[direction]++;
     const bool lost = happens(net, f->loss), twice = happens(net, f->duplicate), late = happens(net, f->reorder);
     const bool cut = happens(net, f->truncate) && len > 0, stranger = happens(net, f->foreign);
-    const int64_t due_ns = at_ns + draw_delay(net);
+    const int64_t due_ns = arrival(net, direction, at_ns);
     if (stranger)
         send_foreign(net, direction, at_ns);
     if (lost) {
@@ -145,7 +185,7 @@ static void carry(struct sim_net *const net, const enum direction direction, con
     }
     if (!twice)
         return;
-    struct datagram *const copy = enqueue(net, direction, at_ns + draw_delay(net), data, len);
+    struct datagram *const copy = enqueue(net, direction, arrival(net, direction, at_ns), data, len);
     if (copy) {
         copy->copy = true;
         net->truth.duplicated[direction]++;
@@ -313,14 +353,21 @@ static bool probability(const double p)
     return p >= 0.0 && p <= 1.0;
 }
 
+static bool delay(const int64_t ns)
+{
+    return ns >= 0 && ns <= MAX_DELAY_NS;
+}
+
 int sim_faults_check(const struct sim_faults *const f)
 {
     if (!probability(f->loss) || !probability(f->duplicate) || !probability(f->reorder) || !probability(f->truncate) ||
         !probability(f->foreign) || !probability(f->tail))
         return HM2_ERR_RANGE;
-    if (f->tail_ns < 0 || f->tail_ns > MAX_DELAY_NS)
+    if (!delay(f->tail_ns) || !delay(f->coalesce_ns) || !delay(f->sleep_ns) || !delay(f->wake_ns) ||
+        !delay(f->busy_every_ns) || !delay(f->busy_ns))
         return HM2_ERR_RANGE;
-    if (f->delay_min_ns < 0 || f->delay_max_ns > MAX_DELAY_NS || f->delay_min_ns > f->delay_max_ns)
+    if (!delay(f->delay_min_ns) || !delay(f->delay_max_ns) || f->delay_min_ns > f->delay_max_ns ||
+        f->busy_ns > f->busy_every_ns)
         return HM2_ERR_RANGE;
     return 0;
 }

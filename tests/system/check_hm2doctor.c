@@ -199,6 +199,25 @@ START_TEST(a_simulated_card_is_measured_kept_and_drawn)
 }
 END_TEST
 
+/* Delays that a busy machine does not hide; what else it adds is its own affair. (test_doctor has exact ones.) */
+static const struct {
+    const char *faults, *name;
+} networks[] = {
+    {"coalesce=4000", "(coalescing)"},
+    {"sleep=500:5000", "sleeps in between"},
+    {"busy=20000:8000", "other packets are in the way"},
+};
+
+START_TEST(the_pattern_of_a_simulated_network_is_named)
+{
+    static struct simulator sim;
+    simulator_start(&sim, (const char *const[]){"--faults", networks[_i].faults, NULL});
+    ck_assert_int_eq(DOCTOR("--card", sim.address[0], "--seconds", "1"), 1);
+    expect_line("advice", "pattern", networks[_i].name);
+    simulator_stop(&sim);
+}
+END_TEST
+
 START_TEST(a_card_that_does_not_answer_is_a_fault)
 {
     ck_assert_int_eq(DOCTOR("--card", "127.66.66.66", "--seconds", "1", "--period", "100000"), 1);
@@ -231,6 +250,8 @@ int main(void)
     tcase_add_loop_test(tests, each_pattern_of_delays_is_named, 0, (int)(sizeof patterns / sizeof patterns[0]));
     tcase_add_test(tests, a_file_that_is_no_measurement_is_refused_with_its_line);
     tcase_add_test(tests, a_simulated_card_is_measured_kept_and_drawn);
+    tcase_add_loop_test(tests, the_pattern_of_a_simulated_network_is_named, 0,
+                        (int)(sizeof networks / sizeof networks[0]));
     tcase_add_test(tests, a_card_that_does_not_answer_is_a_fault);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);

@@ -113,6 +113,37 @@ static void a_power_cycle_forgets_data_and_keeps_the_encoder(void **state)
     sim_card_free(card);
 }
 
+/* A real one latches its position at the first edge. */
+static void an_encoder_that_moves_during_a_transfer_sends_where_it_was_at_the_start(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *firmware;
+        uint8_t gtag;
+        uint16_t start, control, data;
+        uint32_t set, mask;
+    } rows[] = {
+        {"SISS4_4_72", HM2_GTAG_SSI, 0x6800, 0x6A00, 0x6800, 0x028F0010, 0xFFFF},
+        {"BI1_72", HM2_GTAG_BISS, 0x4900, 0x4A00, 0x4900, 0x0CCD2410, 0xFFFF},
+        {"FA1_72", HM2_GTAG_FABS, 0x1500, 0x1800, 0x1500, 0, 0xFFFF},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct sim_card *const card = new_card(rows[i].firmware, SIM_SOURCES_OF_MAP);
+        struct sim_absolute encoder = {
+            .bits = rows[i].gtag == HM2_GTAG_FABS ? 76 : 16, .value = {0x5A5A}, .delay_ps = 50000};
+        assert_int_equal(sim_card_absolute(card, rows[i].gtag, 0, &encoder), 0);
+        sim_card_write(card, 2000, rows[i].control, rows[i].set);
+        sim_card_write(card, 2100, rows[i].start, 0);
+        for (int64_t clk = 2200; clk < 2800; clk += 100) {
+            encoder.value[0] ^= 0xFFFF;
+            sim_card_advance(card, clk);
+            assert_int_equal(sim_card_absolute(card, rows[i].gtag, 0, &encoder), 0);
+        }
+        assert_int_equal(sim_card_read(card, 100000, rows[i].data, NULL) & rows[i].mask, 0x5A5A);
+        sim_card_free(card);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -122,6 +153,7 @@ int main(void)
         cmocka_unit_test(the_start_masks_of_biss_are_crossed_in_the_sources_of_2021_only),
         cmocka_unit_test(the_setup_bit_of_fanuc_is_24_in_the_sources_of_2021_and_7_in_later_ones),
         cmocka_unit_test(a_power_cycle_forgets_data_and_keeps_the_encoder),
+        cmocka_unit_test(an_encoder_that_moves_during_a_transfer_sends_where_it_was_at_the_start),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -290,6 +290,85 @@ static void a_card_that_was_idle_starts_as_slowly(void **state)
     drop(&rig);
 }
 
+/* ---- patterns of delays -------------------------------------------------------------------------------------------
+ */
+
+/* Time from the request to the reply, on a line that was at rest for pause_ns. */
+static int64_t round_trip_ns(const struct rig *const rig, const int64_t pause_ns, const uint16_t number)
+{
+    sim_net_sleep_until(rig->net, link_now_ns(rig->link) + pause_ns);
+    const int64_t start_ns = link_now_ns(rig->link);
+    send_number(rig, number);
+    assert_int_equal(receive_number(rig, start_ns + 100 * MS), number);
+    return link_now_ns(rig->link) - start_ns;
+}
+
+static void a_long_tail_is_as_rare_and_as_late_as_given(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(&(struct sim_faults){.seed = 5, .tail = 0.01, .tail_ns = 900000});
+    unsigned late = 0;
+    for (uint16_t i = 1; i <= 10000; i++) {
+        const int64_t ns = round_trip_ns(&rig, MS, i);
+        assert_in_range(ns % 900000, 12000, 20000);
+        late += ns > 900000;
+    }
+    assert_in_range(late, 150, 250); /* of two datagrams one in a hundred */
+    drop(&rig);
+}
+
+static void a_port_that_coalesces_tells_of_several_replies_at_once(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(&(struct sim_faults){.coalesce_ns = 200000});
+    for (unsigned i = 0; i < 3; i++) {
+        sim_net_sleep_until(rig.net, (int64_t)i * 80000);
+        send_number(&rig, (uint16_t)i);
+    }
+    assert_int_equal(receive_number(&rig, MS), 0);
+    const int64_t told_ns = link_now_ns(rig.link);
+    assert_in_range(told_ns, 212000, 220000);
+    for (int i = 1; i < 3; i++)
+        assert_int_equal(receive_number(&rig, told_ns), i);
+    send_number(&rig, 3); /* starts the timer anew */
+    assert_int_equal(receive_number(&rig, MS), 3);
+    assert_in_range(link_now_ns(rig.link) - told_ns, 212000, 220000);
+    drop(&rig);
+}
+
+static void a_line_that_slept_is_late_once(void **state)
+{
+    (void)state;
+    struct rig rig = rig_with(&(struct sim_faults){.sleep_ns = 100000, .wake_ns = 30000});
+    for (uint16_t i = 0; i < 100; i++) {
+        const int64_t rested_ns = round_trip_ns(&rig, MS, i), awake_ns = round_trip_ns(&rig, 50000, i);
+        assert_in_range(awake_ns, 12000, 20000);
+        assert_int_equal(rested_ns, awake_ns + 30000);
+    }
+    drop(&rig);
+}
+
+static void a_busy_neighbour_has_the_line_once_in_each_turn(void **state)
+{
+    (void)state;
+    const struct sim_faults faults = {.seed = 9, .busy_every_ns = 10 * MS, .busy_ns = 500000};
+    struct rig rig = rig_with(&faults), again = rig_with(&faults);
+    unsigned waits = 0;
+    int64_t longest_ns = 0;
+    for (uint16_t i = 1; i <= 10000; i++) {
+        const int64_t ns = round_trip_ns(&rig, 83000, i);
+        assert_int_equal(round_trip_ns(&again, 83000, i), ns);
+        assert_in_range(ns, 12000, 520000);
+        waits += ns > 20000;
+        longest_ns = ns > longest_ns ? ns : longest_ns;
+    }
+    /* 10000 trips in about 1.03 s, which are 103 turns */
+    assert_in_range(waits, 95, 110);
+    assert_true(longest_ns > 400000);
+    drop(&rig);
+    drop(&again);
+}
+
 static void faults_out_of_range_are_refused(void **state)
 {
     (void)state;
@@ -300,6 +379,8 @@ static void faults_out_of_range_are_refused(void **state)
         {.tail_ns = -1},      {.truncate = -1},
         {.foreign = 1e300},   {.delay_min_ns = 5, .delay_max_ns = 4},
         {.delay_min_ns = -1}, {.delay_max_ns = INT64_MAX},
+        {.coalesce_ns = -1},  {.sleep_ns = 2000000000},
+        {.wake_ns = -1},      {.busy_every_ns = 5, .busy_ns = 6},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         assert_int_equal(sim_net_set_faults(rig.net, &bad[i]), HM2_ERR_RANGE);
@@ -321,6 +402,10 @@ int main(void)
         cmocka_unit_test(an_instant_network_still_waits_as_long_as_it_is_asked_to),
         cmocka_unit_test(a_power_cycle_costs_a_second),
         cmocka_unit_test(a_card_that_was_idle_starts_as_slowly),
+        cmocka_unit_test(a_long_tail_is_as_rare_and_as_late_as_given),
+        cmocka_unit_test(a_port_that_coalesces_tells_of_several_replies_at_once),
+        cmocka_unit_test(a_line_that_slept_is_late_once),
+        cmocka_unit_test(a_busy_neighbour_has_the_line_once_in_each_turn),
         cmocka_unit_test(faults_out_of_range_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -12,6 +12,7 @@
 #include <stdio.h>
 
 #include <hm2/err.h>
+#include <hm2/link.h>
 
 /* ---- facts ------------------------------------------------------------------------------------------------------- */
 
@@ -105,6 +106,15 @@ struct measuring {
     unsigned reply_bytes;
 };
 
+/* How time passes by a link's clock. */
+struct waiting {
+    void (*until)(void *context, int64_t ns);
+    void *context;
+};
+
+int rounds_measure_by(struct link *link, const struct waiting *waiting, const struct measuring *measuring,
+                      struct rounds *rounds, struct hm2_diag *diag);
+/* The same on this computer, with the priority of a servo thread where that is permitted. */
 int rounds_measure(const struct measuring *measuring, struct rounds *rounds, struct hm2_diag *diag);
 /* Lines "paced NS", "burst NS", "spacing NS" and "lost". */
 int rounds_read(const char *path, struct rounds *rounds, struct hm2_diag *diag);

@@ -2,12 +2,12 @@
 /* Round trips to the card: one a period, several without a pause, and pairs. Only the card's description is read. */
 #include <sched.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
 #include <time.h>
 
 #include <hm2/idrom.h>
 #include <hm2/lbp16.h>
-#include <hm2/link.h>
 
 #include "doctor.h"
 
@@ -24,6 +24,7 @@
 
 struct meter {
     struct link *link;
+    const struct waiting *waiting;
     uint8_t request[64];
     size_t request_len, reply_len;
 };
@@ -69,10 +70,9 @@ static int64_t round_trip(const struct meter *const meter)
     return end < 0 ? -1 : end - start;
 }
 
-static void sleep_until(const int64_t ns)
+static void wait_until(const struct meter *const meter, const int64_t ns)
 {
-    const struct timespec until = {.tv_sec = (time_t)(ns / NS_PER_S), .tv_nsec = (long)(ns % NS_PER_S)};
-    (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
+    meter->waiting->until(meter->waiting->context, ns);
 }
 
 static void measure_paced(const struct meter *const meter, const struct measuring *const what,
@@ -81,7 +81,7 @@ static void measure_paced(const struct meter *const meter, const struct measurin
     int64_t next = link_now_ns(meter->link);
     for (size_t i = 0; i < count; i++) {
         next += what->period_us * NS_PER_US;
-        sleep_until(next);
+        wait_until(meter, next);
         drop_old_replies(meter);
         const int64_t ns = round_trip(meter);
         if (ns < 0)
@@ -97,7 +97,7 @@ static void measure_paced(const struct meter *const meter, const struct measurin
 static void measure_bursts(const struct meter *const meter, struct rounds *const rounds)
 {
     for (unsigned i = 0; i < BURSTS; i++) {
-        sleep_until(link_now_ns(meter->link) + PAUSE_NS);
+        wait_until(meter, link_now_ns(meter->link) + PAUSE_NS);
         drop_old_replies(meter);
         for (unsigned k = 0; k < BURST_ROUNDS; k++) {
             const int64_t ns = round_trip(meter);
@@ -112,14 +112,13 @@ static void measure_bursts(const struct meter *const meter, struct rounds *const
 static void measure_pairs(const struct meter *const meter, struct rounds *const rounds)
 {
     for (unsigned i = 0; i < PAIRS; i++) {
-        sleep_until(link_now_ns(meter->link) + PAUSE_NS);
+        wait_until(meter, link_now_ns(meter->link) + PAUSE_NS);
         drop_old_replies(meter);
         const int64_t start = link_now_ns(meter->link);
         if (link_send(meter->link, meter->request, meter->request_len) < 0)
             continue;
         const int64_t first = next_reply(meter, start + PAIR_NS);
-        while (link_now_ns(meter->link) < start + PAIR_NS) {
-        }
+        wait_until(meter, start + PAIR_NS);
         if (link_send(meter->link, meter->request, meter->request_len) < 0)
             continue;
         const int64_t once = first >= 0 ? first : next_reply(meter, start + LOST_AFTER_NS);
@@ -129,41 +128,71 @@ static void measure_pairs(const struct meter *const meter, struct rounds *const 
     }
 }
 
+/* Touched here, not in the midst of a round. */
+static int64_t *touched_list(const size_t count)
+{
+    int64_t *const list = malloc(count * sizeof *list);
+    if (list)
+        memset(list, 0xFF, count * sizeof *list);
+    return list;
+}
+
 static int allocate(struct rounds *const rounds, const size_t count)
 {
-    rounds->paced_ns = calloc(count, sizeof(int64_t));
-    rounds->burst_ns = calloc(BURSTS * BURST_ROUNDS, sizeof(int64_t));
-    rounds->spacing_ns = calloc(PAIRS, sizeof(int64_t));
+    rounds->paced_ns = touched_list(count);
+    rounds->burst_ns = touched_list(BURSTS * BURST_ROUNDS);
+    rounds->spacing_ns = touched_list(PAIRS);
     return rounds->paced_ns && rounds->burst_ns && rounds->spacing_ns ? 0 : HM2_ERR_NOMEM;
+}
+
+int rounds_measure_by(struct link *const link, const struct waiting *const waiting, const struct measuring *const what,
+                      struct rounds *const rounds, struct hm2_diag *const diag)
+{
+    const long wanted = what->seconds * (1000000L / what->period_us);
+    const size_t count = wanted < (long)MAX_ROUNDS ? (size_t)wanted : MAX_ROUNDS;
+    struct meter meter = {.link = link, .waiting = waiting};
+    int err = make_request(&meter, what->reply_bytes);
+    if (!err)
+        err = allocate(rounds, count > 0 ? count : 1);
+    if (err)
+        return hm2_diag_add(diag, err, "no memory for %zu round trips\n", count);
+    measure_paced(&meter, what, rounds, count);
+    if (rounds->paced > 0) {
+        measure_bursts(&meter, rounds);
+        measure_pairs(&meter, rounds);
+    }
+    return 0;
+}
+
+/* ---- on this computer ---------------------------------------------------------------------------------------------
+ */
+
+/* A sleep ends some tens of microseconds late: what is shorter than that is watched. */
+static void sleep_until(void *const link, const int64_t ns)
+{
+    const struct timespec until = {.tv_sec = (time_t)(ns / NS_PER_S), .tv_nsec = (long)(ns % NS_PER_S)};
+    if (ns - link_now_ns(link) > PAIR_NS)
+        (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
+    while (link_now_ns(link) < ns) {
+    }
 }
 
 int rounds_measure(const struct measuring *const what, struct rounds *const rounds, struct hm2_diag *const diag)
 {
     const struct link_udp_options options = {.address = what->card};
     const struct sched_param priority = {.sched_priority = PRIORITY};
-    const long wanted = what->seconds * (1000000L / what->period_us);
-    const size_t count = wanted < (long)MAX_ROUNDS ? (size_t)wanted : MAX_ROUNDS;
-    struct meter meter = {.link = NULL};
-    int err = make_request(&meter, what->reply_bytes);
-    if (!err)
-        err = allocate(rounds, count > 0 ? count : 1);
-    if (err)
-        return hm2_diag_add(diag, err, "no memory for %zu round trips\n", count);
-    err = link_udp_open(&meter.link, &options, diag);
+    struct link *link;
+    int err = link_udp_open(&link, &options, diag);
     if (err)
         return err;
     /* As the servo thread would; where it is not permitted, the numbers are those of an ordinary program. */
     const bool locked = mlockall(MCL_CURRENT) == 0;
     const bool realtime = sched_setscheduler(0, SCHED_FIFO, &priority) == 0;
-    measure_paced(&meter, what, rounds, count);
-    if (rounds->paced > 0) {
-        measure_bursts(&meter, rounds);
-        measure_pairs(&meter, rounds);
-    }
+    err = rounds_measure_by(link, &(struct waiting){sleep_until, link}, what, rounds, diag);
     if (realtime)
         (void)sched_setscheduler(0, SCHED_OTHER, &(struct sched_param){.sched_priority = 0});
     if (locked)
         (void)munlockall();
-    link_close(meter.link);
-    return 0;
+    link_close(link);
+    return err;
 }

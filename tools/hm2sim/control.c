@@ -11,10 +11,12 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "faults.h"
 #include "remotes.h"
 
-#define MAX_WORDS 6u
-#define ANY_WORDS 0u
+#define MAX_WORDS    6u
+#define ANY_WORDS    0u
+#define COMMAND_SIZE 512u
 
 struct command {
     const char *words[MAX_WORDS];
@@ -47,7 +49,7 @@ static void do_faults(const struct command *const c)
 {
     struct hm2_diag diag = {0};
     struct sim_faults faults = {.seed = 0};
-    if (options_faults(c->words[1], &faults, &diag)) {
+    if (faults_option(c->words[1], &faults, &diag)) {
         snprintf(c->reply, CONTROL_REPLY_SIZE, "error: %.1000s", diag.text);
         return;
     }
@@ -150,6 +152,20 @@ static void do_stats(const struct command *const c)
     }
 }
 
+/* What follows the reader stands behind a space here. */
+static void do_absolute(const struct command *const c)
+{
+    char text[COMMAND_SIZE];
+    struct absolute_encoder encoder;
+    struct hm2_diag diag = {0};
+    snprintf(text, sizeof text, "%s:%s", c->words[1], c->words[2]);
+    int err = absolute_option(text, &encoder, &diag);
+    for (unsigned i = 0; i < c->stations && !err; i++)
+        err = absolutes_add(&c->first[i].absolutes, &encoder, c->now_ns, &diag);
+    if (err)
+        snprintf(c->reply, CONTROL_REPLY_SIZE, "error: %.1000s", diag.text);
+}
+
 static void do_remote(const struct command *const c)
 {
     for (unsigned i = 0; i < c->stations; i++) {
@@ -181,6 +197,7 @@ static const struct {
     {"flash", 1, do_flash},
     {"quit", 1, do_quit},
     {"remote", ANY_WORDS, do_remote},
+    {"absolute", 3, do_absolute},
 };
 
 /* "card N" in front names one card; else a command is for all of them. */
@@ -221,7 +238,8 @@ bool control_command(char *const text, struct station *const stations, const uns
         return commands[i].run == do_quit;
     }
     answer(&c, "error: commands are: [card N] faults LIST, freeze on|off, power-cycle, power-off, flash, "
-               "flash-faults LIST, boots, drive IO 0|1|z|h, pad IO, remote PORT:CHANNEL ..., stats, quit");
+               "flash-faults LIST, boots, drive IO 0|1|z|h, pad IO, remote PORT:CHANNEL ..., absolute READER LIST, "
+               "stats, quit");
     return false;
 }
 
@@ -261,7 +279,7 @@ static bool obey(char *const text, struct station *const stations, const unsigne
 
 bool control_receive(const int fd, struct station *const stations, const unsigned count, const int64_t now_ns)
 {
-    char command[512], reply[CONTROL_REPLY_SIZE];
+    char command[COMMAND_SIZE], reply[CONTROL_REPLY_SIZE];
     struct sockaddr_un from;
     socklen_t from_len = sizeof from;
     const ssize_t len = recvfrom(fd, command, sizeof command - 1, MSG_DONTWAIT, (struct sockaddr *)&from, &from_len);

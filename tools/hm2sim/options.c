@@ -3,63 +3,26 @@
 
 #include <arpa/inet.h>
 #include <ctype.h>
-#include <errno.h>
 #include <getopt.h>
 #include <limits.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <hm2/lbp16.h>
 
+#include "faults.h"
 #include "sserial.h"
+#include "words.h"
 
 #define NS_PER_S              1e9
 #define NS_PER_MS             1e6
-#define NS_PER_US             1e3
 #define MAX_SECONDS           1e6
 #define DEFAULT_PRIORITY      50
 #define ADDRESS_CHARACTERS    32
 #define MAX_PATTERN_PERIOD_MS 1e6
 #define MAX_TIME_CONSTANT_MS  1e5
 #define MS_PER_S              1e3
-
-/* ---- numbers ------------------------------------------------------------------------------------------------------
- */
-
-static bool read_unsigned(const char *const text, const unsigned long max, const char **const end,
-                          unsigned long *const value)
-{
-    if (*text < '0' || *text > '9')
-        return false;
-    char *stop;
-    errno = 0;
-    *value = strtoul(text, &stop, 10);
-    *end = stop;
-    return errno == 0 && *value <= max;
-}
-
-static bool whole_unsigned(const char *const text, const unsigned long max, unsigned long *const value)
-{
-    const char *end;
-    return read_unsigned(text, max, &end, value) && *end == '\0';
-}
-
-static bool read_real(const char *const text, const double min, const double max, const char **const end,
-                      double *const value)
-{
-    char *stop;
-    *value = strtod(text, &stop);
-    *end = stop;
-    return stop != text && isfinite(*value) && *value >= min && *value <= max;
-}
-
-static bool whole_real(const char *const text, const double min, const double max, double *const value)
-{
-    const char *end;
-    return read_real(text, min, max, &end, value) && *end == '\0';
-}
 
 /* ---- single options -----------------------------------------------------------------------------------------------
  */
@@ -195,22 +158,6 @@ static int add_wire(struct reading *const r, const char *const value)
     return 0;
 }
 
-static bool read_ratio(const char *const text, struct follower *const f)
-{
-    unsigned long num, den = 1;
-    const char *end;
-    const bool backwards = *text == '-';
-    if (!read_unsigned(text + backwards, INT32_MAX, &end, &num))
-        return false;
-    if (*end == '/' && (!whole_unsigned(end + 1, INT32_MAX, &den) || den == 0))
-        return false;
-    if (*end != '/' && *end != '\0')
-        return false;
-    f->num = backwards ? -(int32_t)num : (int32_t)num;
-    f->den = (int32_t)den;
-    return true;
-}
-
 static int add_follower(struct reading *const r, const char *const value)
 {
     static const char wanted[] = "ENCODER:STEPGEN or ENCODER:STEPGEN:NUM/DEN";
@@ -220,7 +167,7 @@ static int add_follower(struct reading *const r, const char *const value)
     if (!read_unsigned(value, UINT8_MAX, &end, &encoder) || *end != ':' ||
         !read_unsigned(end + 1, UINT8_MAX, &end, &stepgen))
         return refuse(r, "--follow", value, wanted);
-    if (*end != '\0' && (*end != ':' || !read_ratio(end + 1, &f)))
+    if (*end != '\0' && (*end != ':' || !read_ratio(end + 1, &end, &f.num, &f.den) || *end != '\0'))
         return refuse(r, "--follow", value, wanted);
     if (r->card->follower_count == MAX_WIRES)
         return refuse(r, "--follow", value, "at most 32 followers a card");
@@ -238,16 +185,6 @@ bool options_level(const char letter, enum sim_level *const level)
     if (!at)
         return false;
     *level = levels[at - letters];
-    return true;
-}
-
-static bool read_signed(const char *const text, const long max, const char **const end, long *const value)
-{
-    unsigned long size;
-    const bool negative = *text == '-';
-    if (!read_unsigned(text + negative, (unsigned long)max, end, &size))
-        return false;
-    *value = negative ? -(long)size : (long)size;
     return true;
 }
 
@@ -333,6 +270,14 @@ static int add_servo_card_motor(struct reading *const r, const char *const value
     return 0;
 }
 
+/* READER:KEY=VALUE,... */
+static int add_absolute(struct reading *const r, const char *const value)
+{
+    if (r->card->absolute_count == MAX_ABSOLUTES)
+        return refuse(r, "--absolute", value, "at most 32 absolute encoders a card");
+    return absolute_option(value, &r->card->absolutes[r->card->absolute_count++], &r->diag);
+}
+
 /* ENCODER:COUNTS */
 static int add_index(struct reading *const r, const char *const value)
 {
@@ -347,25 +292,6 @@ static int add_index(struct reading *const r, const char *const value)
     return 0;
 }
 
-/* "stepgen.N" or "encoder.N" */
-static bool read_axis(const char *const text, const char **const end, struct position_switch *const s)
-{
-    static const struct {
-        const char *name;
-        uint8_t gtag;
-    } kinds[] = {{"stepgen.", HM2_GTAG_STEPGEN}, {"encoder.", HM2_GTAG_ENCODER}};
-    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
-        const size_t len = strlen(kinds[i].name);
-        unsigned long unit;
-        if (strncmp(text, kinds[i].name, len) != 0 || !read_unsigned(text + len, UINT8_MAX, end, &unit))
-            continue;
-        s->gtag = kinds[i].gtag;
-        s->unit = (unsigned)unit;
-        return true;
-    }
-    return false;
-}
-
 /* IO:AXIS:POSITION:LEVELS */
 static int add_switch(struct reading *const r, const char *const value)
 {
@@ -373,8 +299,8 @@ static int add_switch(struct reading *const r, const char *const value)
     unsigned long io;
     long position;
     const char *at;
-    if (!read_unsigned(value, HM2_MAX_PINS, &at, &io) || *at != ':' || !read_axis(at + 1, &at, &s) || *at != ':' ||
-        !read_signed(at + 1, INT32_MAX, &at, &position) || *at != ':' || strlen(at + 1) != 2 ||
+    if (!read_unsigned(value, HM2_MAX_PINS, &at, &io) || *at != ':' || !read_axis(at + 1, &at, &s.gtag, &s.unit) ||
+        *at != ':' || !read_signed(at + 1, INT32_MAX, &at, &position) || *at != ':' || strlen(at + 1) != 2 ||
         !options_level(at[1], &s.below) || !options_level(at[2], &s.above))
         return refuse(r, "--switch", value,
                       "IO:AXIS:POSITION:LEVELS, an axis such as stepgen.0 or encoder.0, and two of the levels 0, 1, z, "
@@ -464,54 +390,6 @@ static int add_servo(struct reading *const r, const char *const value)
     return 0;
 }
 
-/* ---- faults -------------------------------------------------------------------------------------------------------
- */
-
-/* "US" or "US-US" */
-static bool read_delay(const char *const text, const char **const end, struct sim_faults *const faults)
-{
-    double min, max;
-    if (!read_real(text, 0, 1e6, end, &min))
-        return false;
-    max = min;
-    if (**end == '-' && !read_real(*end + 1, min, 1e6, end, &max))
-        return false;
-    faults->delay_min_ns = (int64_t)(min * NS_PER_US);
-    faults->delay_max_ns = (int64_t)(max * NS_PER_US);
-    return true;
-}
-
-int options_faults(const char *text, struct sim_faults *const faults, struct hm2_diag *const diag)
-{
-    static const char wanted[] =
-        "loss, dup, reorder, truncate, foreign = 0..1 and delay = MICROSECONDS[-MICROSECONDS], "
-        "separated by commas, or none";
-    struct sim_faults f = {.seed = faults->seed};
-    const struct {
-        const char *name;
-        double *probability;
-    } names[] = {{"loss=", &f.loss},
-                 {"dup=", &f.duplicate},
-                 {"reorder=", &f.reorder},
-                 {"truncate=", &f.truncate},
-                 {"foreign=", &f.foreign}};
-    const char *const all = text;
-    if (strcmp(text, "none") == 0)
-        text = "";
-    while (*text) {
-        const char *end = NULL;
-        bool good = strncmp(text, "delay=", 6) == 0 && read_delay(text + 6, &end, &f);
-        for (size_t i = 0; i < sizeof names / sizeof names[0] && !good; i++)
-            good = strncmp(text, names[i].name, strlen(names[i].name)) == 0 &&
-                   read_real(text + strlen(names[i].name), 0, 1, &end, names[i].probability);
-        if (!good || (*end != '\0' && (*end != ',' || end[1] == '\0')))
-            return hm2_diag_add(diag, HM2_ERR_INVALID, "faults \"%s\": expected %s", all, wanted);
-        text = *end ? end + 1 : end;
-    }
-    *faults = f;
-    return 0;
-}
-
 /* ---- the command line ---------------------------------------------------------------------------------------------
  */
 
@@ -522,12 +400,14 @@ enum {
     OPT_SEED,
     OPT_FIRMWARE,
     OPT_NAME,
+    OPT_SOURCES,
     OPT_FAULTS,
     OPT_WIRE,
     OPT_FOLLOW,
     OPT_MOTOR,
     OPT_RESOLVER,
     OPT_INDEX,
+    OPT_ABSOLUTE,
     OPT_UART,
     OPT_SERVO_CARD,
     OPT_SERVO_CARD_MOTOR,
@@ -559,6 +439,7 @@ static const struct option long_options[] = {
     {"port", required_argument, NULL, OPT_PORT},
     {"seed", required_argument, NULL, OPT_SEED},
     {"firmware", required_argument, NULL, OPT_FIRMWARE},
+    {"sources", required_argument, NULL, OPT_SOURCES},
     {"name", required_argument, NULL, OPT_NAME},
     {"faults", required_argument, NULL, OPT_FAULTS},
     {"wire", required_argument, NULL, OPT_WIRE},
@@ -566,6 +447,7 @@ static const struct option long_options[] = {
     {"motor", required_argument, NULL, OPT_MOTOR},
     {"resolver", required_argument, NULL, OPT_RESOLVER},
     {"index", required_argument, NULL, OPT_INDEX},
+    {"absolute", required_argument, NULL, OPT_ABSOLUTE},
     {"uart", required_argument, NULL, OPT_UART},
     {"7i65", required_argument, NULL, OPT_SERVO_CARD},
     {"7i65-motor", required_argument, NULL, OPT_SERVO_CARD_MOTOR},
@@ -617,7 +499,8 @@ static void print_help(void)
     fputs("  --bind ADDRESS      of cards that give none (127.0.0.1)\n"
           "  --port PORT         of cards that give none (27181; 0 = any free one)\n"
           "  --seed N            of faults and MAC addresses (1)\n"
-          "  --faults LIST       loss=, dup=, reorder=, truncate=, foreign= 0..1, delay=US[-US]; by commas\n"
+          "  --faults LIST       loss=, dup=, reorder=, truncate=, foreign= 0..1, delay=US[-US], tail=0..1:US,\n"
+          "                      coalesce=US, sleep=US:US, busy=US:US; by commas\n"
           "  --latency           replies take the time that a card takes\n"
           "  --realtime[=PRIO]   SCHED_FIFO (priority 50) and locked memory, where permitted\n"
           "  --run SECONDS       end after this time\n"
@@ -629,6 +512,7 @@ static void print_help(void)
           "\n"
           "of the card named last, or of every card when before the first --card:\n"
           "  --firmware FILE     image as text, lines of ADDRESS VALUE in hexadecimal\n"
+          "  --sources NAME      of its modules where generations differ without the image saying so: 2021 or later\n"
           "  --name NAME         card name that it reports, in place of its type's\n"
           "  --mac XX:XX:XX:XX:XX:XX\n"
           "  --flash FILE        keep the configuration flash in a file\n"
@@ -642,6 +526,10 @@ static void print_help(void)
           "  --resolver CH:TURNS[:PWMGEN:SPEED]  a resolver, and a motor that turns it, SPEED turns a second at full "
           "duty\n"
           "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
+          "  --absolute READER:LIST          an absolute encoder at ssi.N, biss.N or fanuc.N. Keys, by commas: bits=,\n"
+          "                      value=HEX, position=AT:WIDTH[g], turns=AT:WIDTH[g], start=, speed=, "
+          "with=AXIS[:NUM/DEN],\n"
+          "                      delay=NS, idle=NS, processing=CLOCKS\n"
           "  --uart PORT:TARGET  at uart.N or pktuart.N: loop, or the path of a terminal to make\n"
           "  --7i65 PORT         a 7I65 with axes at a buffered SPI port\n"
           "  --7i65-motor ENC:OUTPUT:COUNTS[:MS]  a motor at its output, COUNTS a second at 10 V, with a lag\n"
@@ -718,6 +606,15 @@ static int take_flash_option(struct reading *const r, const int option, const ch
     }
 }
 
+static int set_sources(struct reading *const r, const char *const value)
+{
+    const bool later = strcmp(value, "later") == 0;
+    if (!later && strcmp(value, "2021") != 0)
+        return refuse(r, "--sources", value, "2021 or later");
+    r->card->sources = later ? SIM_SOURCES_LATER : SIM_SOURCES_2021;
+    return 0;
+}
+
 static int take_card_option(struct reading *const r, const int option, const char *const value)
 {
     switch (option) {
@@ -727,6 +624,8 @@ static int take_card_option(struct reading *const r, const int option, const cha
     case OPT_NAME:
         r->card->name = value;
         return 0;
+    case OPT_SOURCES:
+        return set_sources(r, value);
     case OPT_MAC:
         return set_mac(r, value);
     case OPT_WIRE:
@@ -739,6 +638,8 @@ static int take_card_option(struct reading *const r, const int option, const cha
         return add_resolver(r, value);
     case OPT_INDEX:
         return add_index(r, value);
+    case OPT_ABSOLUTE:
+        return add_absolute(r, value);
     case OPT_UART:
         return add_uart(r, value);
     case OPT_SERVO_CARD:
@@ -776,7 +677,7 @@ static int take(struct reading *const r, const int option, const char *const val
     case OPT_SERIAL:
         return add_serial(r, value);
     case OPT_FAULTS:
-        return options_faults(value, &o->faults, &r->diag);
+        return faults_option(value, &o->faults, &r->diag);
     case OPT_LATENCY:
         o->latency = true;
         return 0;

@@ -9,6 +9,7 @@
 
 #include <hm2/sim.h>
 
+#include "absolutes.h"
 #include "flash.h"
 
 #define MAX_CARDS    32u
@@ -97,7 +98,8 @@ struct card_options {
     struct in_addr address;
     uint16_t port;
     const char *firmware; /* file */
-    const char *name;     /* that the card reports, or NULL */
+    enum sim_sources sources;
+    const char *name; /* that the card reports, or NULL */
     uint8_t mac[6];
     struct flash_options flash;
     unsigned wire_count, follower_count, motor_count, index_count, switch_count, pattern_count, remote_count,
@@ -111,6 +113,8 @@ struct card_options {
     struct pattern patterns[MAX_PATTERNS];
     struct remote_option remotes[MAX_REMOTES];
     struct servo servos[MAX_WIRES];
+    unsigned absolute_count;
+    struct absolute_encoder absolutes[MAX_ABSOLUTES];
     unsigned uart_count;
     struct uart_option uarts[MAX_UARTS];
     bool has_servo_card; /* a 7I65 at a buffered SPI port */
@@ -144,9 +148,6 @@ enum options_result { OPTIONS_RUN, OPTIONS_EXIT_OK, OPTIONS_EXIT_USAGE };
 /* Reads the command line. Help, version and complaints have been printed when the result is not OPTIONS_RUN. */
 enum options_result options_read(struct options *options, int argc, char **argv);
 
-/* "loss=0.05,dup=0.02,delay=100-300": 0, or an error with a sentence in diag. Faults that are not named become 0;
- * "none" is all of them 0. The seed is left alone. */
-int options_faults(const char *text, struct sim_faults *faults, struct hm2_diag *diag);
 /* "0", "1", "z" (floating), "h" (pulled up). */
 bool options_level(char letter, enum sim_level *level);
 

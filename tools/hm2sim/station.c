@@ -77,6 +77,7 @@ void station_receive(struct station *const s, const int64_t now_ns)
     s->requests++;
     drive_patterns(s, now_ns); /* what was due before it came has happened, whichever the loop looked at first */
     press_switches(s, now_ns);
+    absolutes_run(&s->absolutes, now_ns);
     peers_run(&s->peers, now_ns);
     sim_net_arrive(s->net, now_ns, client_number(&from), data, (size_t)len);
 }
@@ -86,6 +87,7 @@ void station_run(struct station *const s, const int64_t now_ns)
     drive_patterns(s, now_ns);
     sim_net_sleep_until(s->net, now_ns);
     press_switches(s, now_ns);
+    absolutes_run(&s->absolutes, now_ns);
     peers_run(&s->peers, now_ns);
     ppmc_turn(&s->ppmc, now_ns);
 }
@@ -106,7 +108,7 @@ int64_t station_next_ns(const struct station *const s)
         const int64_t step_ns = link_now_ns(sim_net_link(s->net)) + WIRED_STEP_NS;
         next_ns = step_ns < next_ns ? step_ns : next_ns;
     }
-    if (peers_exist(&s->peers)) {
+    if (peers_exist(&s->peers) || absolutes_move(&s->absolutes)) {
         const int64_t step_ns = link_now_ns(sim_net_link(s->net)) + PEER_STEP_NS;
         next_ns = step_ns < next_ns ? step_ns : next_ns;
     }
@@ -131,7 +133,8 @@ static int make_card(struct station *const s, const uint64_t seed, struct hm2_di
 {
     const struct card_options *const o = s->options;
     struct hm2_image image;
-    struct sim_card_options options = {.profile = o->type, .card_name = o->name, .seed = seed, .flash_id = o->flash.id};
+    struct sim_card_options options = {
+        .profile = o->type, .card_name = o->name, .seed = seed, .flash_id = o->flash.id, .sources = o->sources};
     memcpy(options.mac, o->mac, sizeof options.mac);
     memcpy(options.ip, &o->address.s_addr, sizeof options.ip);
     if (o->firmware) {
@@ -194,6 +197,8 @@ int station_open(struct station *const s, const struct options *const options, c
         err = peers_connect(&s->peers, card, s->card, diag);
     if (!err)
         err = axes_connect(&s->axes, card, s->card, diag);
+    if (!err)
+        err = absolutes_connect(&s->absolutes, s->card, card->absolutes, card->absolute_count, diag);
     if (!err && card->ppmc)
         err = ppmc_open(&s->ppmc, s->card, card->ppmc, diag);
     if (!err)

@@ -12,6 +12,7 @@ struct station {
     struct sim_card *card;
     struct axes axes;
     struct flash_file flash;
+    struct absolutes absolutes;
     struct peers peers;
     struct ppmc_bus ppmc;
     struct sim_net *net;

@@ -204,9 +204,16 @@ struct sim_faults {
     int64_t delay_min_ns, delay_max_ns;                 /* uniform, on top of the card's own time; 0..1 s */
     double tail;                                        /* probability that a datagram takes tail_ns longer; 0..1 */
     int64_t tail_ns;                                    /* 0..1 s */
+    int64_t coalesce_ns; /* the client's port tells of a datagram so long after it came, and of all that came meanwhile
+                          * with it; 0 = at once, ..1 s */
+    int64_t sleep_ns;    /* a line at rest for longer falls asleep (Energy-Efficient Ethernet), 0..1 s, */
+    int64_t wake_ns;     /* and the next datagram is so late; 0 = it never sleeps, ..1 s */
+    int64_t busy_every_ns, busy_ns; /* once in each so long, at a time from the seed, others have the line for busy_ns;
+                                     * datagrams wait for them. 0 = never, ..1 s */
 };
 
-/* 0, or HM2_ERR_RANGE for a probability outside 0..1, or times outside 0..1 s or with min > max. */
+/* 0, or HM2_ERR_RANGE for a probability outside 0..1, or times outside 0..1 s, with min > max or busy_ns longer than
+ * busy_every_ns. */
 HM2_API int HM2_MUST_CHECK sim_faults_check(const struct sim_faults *faults);
 
 struct sim_net;
