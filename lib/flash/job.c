@@ -98,8 +98,7 @@ static struct flash_job *new_job(struct flash_card *const card, const enum job_k
     }
     job->card = card;
     job->kind = kind;
-    if (options)
-        job->options = *options;
+    job->options = *options;
     job->most_pages = job->options.pages_per_write;
     if (job->most_pages == 0 || job->most_pages > FLASH_PAGES_MOST)
         job->most_pages = FLASH_PAGES_MOST;
@@ -138,11 +137,18 @@ static void start(struct flash_job *const job, const enum job_state state)
 }
 
 /* First of all nobody else may be using the card: reading the flash moves the address register, and the erase of a
- * program that sends address and erase apart would go to where this one reads (H1, H11). */
+ * program that sends address and erase apart would go to where this one reads (H1, H11); and it takes the card so long
+ * that a driver's datagram waits (H10). */
+static int ask_quiet(struct flash_card *const card, const struct flash_options *const options,
+                     struct hm2_diag *const diag)
+{
+    return options->any_traffic ? 0 : flash_card_quiet(card, diag);
+}
+
 static int look_at_flash(struct flash_job *const job, struct flash_survey *const survey, struct hm2_diag *const diag)
 {
     struct flash_survey again;
-    int err = job->options.any_traffic ? 0 : flash_card_quiet(job->card, diag);
+    int err = ask_quiet(job->card, &job->options, diag);
     if (err == 0)
         err = flash_card_survey(job->card, survey, diag);
     if (err == 0)
@@ -236,6 +242,8 @@ int flash_job_verify(struct flash_job **const job, struct flash_card *const card
                            image->part, info->board->part);
     if (err == 0)
         err = flash_check_fits(card, image, options->area, diag);
+    if (err == 0)
+        err = ask_quiet(card, options, diag);
     if (err < 0)
         return err;
     struct flash_job *const made = new_job(card, JOB_VERIFY, options, diag);
@@ -251,7 +259,8 @@ int flash_job_verify(struct flash_job **const job, struct flash_card *const card
 
 /* Compare the chip with `dump`, or read it `into` memory of the caller's. */
 static int whole_chip(struct flash_job **const job, struct flash_card *const card, const uint8_t *const dump,
-                      uint8_t *const into, const size_t len, struct hm2_diag *const diag)
+                      uint8_t *const into, const size_t len, const struct flash_options *const options,
+                      struct hm2_diag *const diag)
 {
     const struct flash_chip *const chip = card->info.chip;
     *job = NULL;
@@ -260,7 +269,10 @@ static int whole_chip(struct flash_job **const job, struct flash_card *const car
                             card->info.card_name, (unsigned)card->info.flash_id & 0xFFu);
     if (len != chip->bytes)
         return hm2_diag_add(diag, HM2_ERR_RANGE, "%zu bytes, and the chip has %u", len, (unsigned)chip->bytes);
-    struct flash_job *const made = new_job(card, into ? JOB_BACKUP : JOB_VERIFY, NULL, diag);
+    const int err = ask_quiet(card, options, diag);
+    if (err < 0)
+        return err;
+    struct flash_job *const made = new_job(card, into ? JOB_BACKUP : JOB_VERIFY, options, diag);
     if (!made)
         return HM2_ERR_NOMEM;
     add_pass(made, &(struct job_pass){.range = {0, chip->bytes}, .raw = dump, .bytes = chip->bytes});
@@ -269,15 +281,15 @@ static int whole_chip(struct flash_job **const job, struct flash_card *const car
 }
 
 int flash_job_verify_dump(struct flash_job **const job, struct flash_card *const card, const uint8_t *const dump,
-                          const size_t len, struct hm2_diag *const diag)
+                          const size_t len, const struct flash_options *const options, struct hm2_diag *const diag)
 {
-    return whole_chip(job, card, dump, NULL, len, diag);
+    return whole_chip(job, card, dump, NULL, len, options, diag);
 }
 
 int flash_job_backup(struct flash_job **const job, struct flash_card *const card, uint8_t *const dump, const size_t len,
-                     struct hm2_diag *const diag)
+                     const struct flash_options *const options, struct hm2_diag *const diag)
 {
-    return whole_chip(job, card, NULL, dump, len, diag);
+    return whole_chip(job, card, NULL, dump, len, options, diag);
 }
 
 static void add_area(struct flash_job *const job, const uint8_t *const dump, const enum flash_area area)
@@ -332,6 +344,12 @@ static int planned(struct flash_job *const job, struct hm2_diag *const diag)
     return 0;
 }
 
+/* Sectors may have been erased. */
+static bool was_changing(const struct flash_job *const job)
+{
+    return job->kind == JOB_WRITE && job->state != JOB_COMPARE && job->state != JOB_PLANNED;
+}
+
 /* Another master that turned up meanwhile; seen over a number of datagrams, as the network may repeat some. */
 static int check_alone(struct flash_job *const job, struct hm2_diag *const diag)
 {
@@ -343,10 +361,12 @@ static int check_alone(struct flash_job *const job, struct hm2_diag *const diag)
     job->foreign_mark = counters->foreign;
     if (foreign <= BUSY_FEW + sent / 4)
         return 0;
-    return hm2_diag_add(diag, HM2_ERR_IO,
-                        "another program has begun to talk to this card (%llu datagrams beside our %llu). The image is "
-                        "not complete: do not switch the card off, stop the other program and run the command again",
-                        (unsigned long long)foreign, (unsigned long long)sent);
+    const bool changed = was_changing(job);
+    return hm2_diag_add(diag, changed ? HM2_ERR_IO : HM2_ERR_STATE,
+                        "another program has begun to talk to this card (%llu datagrams beside our %llu). %s, stop the "
+                        "other program and run the command again",
+                        (unsigned long long)foreign, (unsigned long long)sent,
+                        changed ? "The image is not complete: do not switch the card off" : "Nothing was changed");
 }
 
 static int read_on(struct flash_job *const job, struct hm2_diag *const diag)
@@ -373,7 +393,7 @@ int flash_job_step(struct flash_job *const job, struct hm2_diag *const diag)
     if (job->state == JOB_END)
         return 0;
     int err = steps[job->state](job, diag);
-    if (err == 0 && job->kind == JOB_WRITE)
+    if (err == 0)
         err = check_alone(job, diag);
     if (err < 0)
         return err;
@@ -382,7 +402,7 @@ int flash_job_step(struct flash_job *const job, struct hm2_diag *const diag)
 
 static int stopped(const struct flash_job *const job, struct hm2_diag *const diag)
 {
-    if (job->kind != JOB_WRITE || job->state == JOB_COMPARE || job->state == JOB_PLANNED)
+    if (!was_changing(job))
         return hm2_diag_add(diag, HM2_ERR_STATE, "stopped; nothing was changed");
     return hm2_diag_add(diag, HM2_ERR_IO,
                         "stopped. The image is not complete: do not switch the card off, what it runs now stays until "

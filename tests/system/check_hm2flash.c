@@ -1,13 +1,18 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* hm2flash as a program, on simulated cards over UDP: what it prints, does, refuses, and its exit status. */
+#include <arpa/inet.h>
 #include <check.h>
 #include <pty.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include <hm2/lbp16.h>
 
 #include "flash_rig.h"
 #include "process.h"
@@ -160,6 +165,8 @@ START_TEST(sets_and_reads_settings_and_registers)
     run(DONE, "--device", "7i96s", "--addr", address, "--set", "ledmode=1");
     run(DONE, "--device", "7i96s", "--addr", address, "--json");
     printed("\"eeprom_ip\": \"192.168.5.7\", \"eeprom_netmask\": \"255.255.0.0\", \"led_mode\": 1");
+    run(DONE, "--device", "7i96s", "--addr", address, "--verbose");
+    printed("  EEPROM 0x20: 0507 C0A8 0000 FFFF 0001 ");
     ck_assert_str_eq(run(DONE, "--device", "7i96s", "--addr", address, "--rpo", "0x100"), "55AACAFE\n");
     run(DONE, "--device", "7i96s", "--addr", address, "--wpo", "0x1100=0x21");
     ck_assert_uint_eq(simulator_read(&sim, 0, 0x1100), 0x21);
@@ -314,7 +321,8 @@ START_TEST(judges_addresses_by_the_cards_mask)
     static const struct {
         int status;
         const char *setting;
-    } rows[] = {{DONE, "netmask=255.255.254.0"},
+    } rows[] = {{DONE, "ip=10.0.1.77"}, /* the card's own may be anything */
+                {DONE, "netmask=255.255.254.0"},
                 {DONE, "ip=10.0.0.255"},
                 {DONE, "ip=10.0.1.0"},
                 {REFUSED, "ip=10.0.0.0"},
@@ -413,6 +421,122 @@ START_TEST(refuses_a_file_that_its_check_sum_does_not_fit)
 }
 END_TEST
 
+/* H12 */
+START_TEST(reads_and_never_writes_a_card_whose_chip_it_does_not_know)
+{
+    const char *const image = flash_rig_image("7i93_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 1});
+    simulator_stop(&sim);
+    simulator_start(&sim, (const char *const[]){"--card", "7i93", "--flash-chip", "64Mb", NULL});
+    const char *const address = sim.address[0];
+    run(REFUSED, "--addr", address, "--write", image);
+    printed("the flash chip's ID is 0x16 and the card gives its size as 2^");
+    printed("so it can be read and not written");
+    run(REFUSED, "--addr", address, "--backup-flash", flash_rig_path("dump"));
+    printed("Unknown size FLASH memory on the 7I93 board");
+    run(DONE, "--addr", address, "--json");
+    printed("\"flash_id\": 22, \"flash_bytes\": 0}");
+    run(DONE, "--addr", address, "--verbose");
+    ck_assert_ptr_null(strstr(tool.text, "Flash size")); /* as mesaflash: no line for an ID it does not know */
+    run(DONE, "--addr", address, "--discover");
+    printed("fallback: ?, user: ?");
+    ck_assert_str_eq(simulator_ask(&sim, "card 0 flash"), "programs 0 erases 0 sector-0 0");
+}
+END_TEST
+
+/* H20: by any name, which card it is and which part of it stands there before anything happens. */
+START_TEST(says_which_card_and_which_part_before_it_acts)
+{
+    char board[96], mac[18], line[128];
+    const char *const address = sim.address[1], *const dump = flash_rig_path("dump.bin");
+    const char *const image = flash_rig_image("7i93_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 3});
+    const char *const text = run(DONE, "--device", "ether", "--addr", address, "--json");
+    ck_assert_ptr_nonnull(strstr(text, "\"mac\": \""));
+    snprintf(mac, sizeof mac, "%s", strstr(text, "\"mac\": \"") + 8);
+    snprintf(board, sizeof board, "Board: 7I93 at %s, MAC address %s, ", address, mac);
+    const struct {
+        const char *option, *file, *part, *act;
+    } rows[] = {{"--write", image, "user area", "Programming"},
+                {"--verify", image, "user area", "Verifying"},
+                {"--backup-flash", dump, NULL, "Reading"},
+                {"--verify", dump, "whole flash", "Verifying"},
+                {"--restore-flash", dump, "whole flash", "FLASH memory sectors to write: 0"}};
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        run(DONE, "--device", "ether", "--addr", address, rows[i].option, rows[i].file, "--expect-mac", mac);
+        if (!rows[i].part)
+            continue;
+        snprintf(line, sizeof line, "%s%s\n", board, rows[i].part);
+        printed(line);
+        printed(rows[i].act);
+        ck_assert(strstr(tool.text, line) < strstr(tool.text, rows[i].act));
+        run(REFUSED, "--device", "ether", "--addr", address, rows[i].option, rows[i].file, "--expect-mac",
+            "02:00:00:00:00:01");
+        printed("not 02:00:00:00:00:01");
+    }
+    run(DONE, "--addr", address, "--write", image, "--fallback", "--dry-run", "--override", "7i93", "--confirm",
+        "fallback");
+    snprintf(line, sizeof line, "%sfallback area\n", board);
+    printed(line);
+}
+END_TEST
+
+/* Datagrams to card 1, a thousand a second, until this process is ended. */
+static pid_t start_driver(void)
+{
+    static const uint8_t request[] = {0x01, 0x42, 0x00, 0x01};
+    const pid_t pid = fork();
+    ck_assert_int_ge(pid, 0);
+    if (pid > 0)
+        return pid;
+    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(LBP16_UDP_PORT)};
+    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+    if (inet_pton(AF_INET, sim.address[1], &to.sin_addr) != 1)
+        _exit(1);
+    for (;;) {
+        (void)!sendto(fd, request, sizeof request, 0, (const struct sockaddr *)&to, sizeof to);
+        usleep(1000);
+    }
+}
+
+/* Until the driver had its turn while the tool was looking: on a busy machine it may not at first. */
+static void comes_to(const int status, const char *const words, const char *const *const args)
+{
+    const char *argv[MAX_ARGS] = {process_built("hm2flash"), "--addr", sim.address[1]};
+    int got = -1;
+    for (unsigned n = 0; args[n]; n++)
+        argv[n + 3] = args[n];
+    for (unsigned i = 0; i < 20; i++) {
+        got = process_run(&tool, argv, RUN_MS);
+        if (got == status && strstr(tool.text, words))
+            return;
+        (void)remove(flash_rig_path("dump"));
+    }
+    ck_abort_msg("%s: status %d instead of %d, and no \"%s\": %s", args[0], got, status, words, tool.text);
+}
+
+/* H10, H11: who reads the flash holds up a driver, too. */
+START_TEST(keeps_away_from_the_flash_of_a_card_in_use)
+{
+    static const char words[] = "another program talks to this card", not_looked_at[] = "not looked at while";
+    const char *const image = flash_rig_image("7i93_test.bit", &(struct sim_flash_file){.profile = "7i93", .seed = 3});
+    const char *const dump = flash_rig_path("dump"), *const page = flash_rig_path("page.html");
+    const pid_t driver = start_driver();
+    const struct {
+        int status;
+        const char *words, *args[3];
+    } rows[] = {{REFUSED, words, {"--write", image}},       {REFUSED, words, {"--verify", image}},
+                {REFUSED, words, {"--backup-flash", dump}}, {DONE, not_looked_at, {"--verbose"}},
+                {DONE, not_looked_at, {"--discover"}},      {DONE, "\"in_use\": true}", {"--json"}},
+                {DONE, "created", {"--report", page}}};
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        comes_to(rows[i].status, rows[i].words, rows[i].args);
+    run(DONE, "--addr", sim.address[1], "--verbose", "--any-traffic");
+    printed("  flash: sector 0: boot block");
+    kill(driver, SIGKILL);
+    ck_assert_int_eq(waitpid(driver, NULL, 0), driver);
+    ck_assert_str_eq(simulator_ask(&sim, "card 1 flash"), "programs 0 erases 0 sector-0 0");
+}
+END_TEST
+
 START_TEST(works_on_many_cards_and_finds_them)
 {
     char both[40], line[96];
@@ -462,6 +586,9 @@ int main(void)
     tcase_add_test(tests, believes_a_list_of_known_images);
     tcase_add_test(tests, reminds_of_the_second_chip);
     tcase_add_test(tests, refuses_a_file_that_its_check_sum_does_not_fit);
+    tcase_add_test(tests, reads_and_never_writes_a_card_whose_chip_it_does_not_know);
+    tcase_add_test(tests, says_which_card_and_which_part_before_it_acts);
+    tcase_add_test(tests, keeps_away_from_the_flash_of_a_card_in_use);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
     suite_add_tcase(suite, tests);

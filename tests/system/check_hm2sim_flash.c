@@ -123,7 +123,7 @@ START_TEST(wrong_options_are_refused_with_what_is_right)
     ck_assert_int_eq(fclose(out), 0);
     refused("--flash", file, "has 0 bytes, the chip has 2097152");
     refused("--flash", "/nowhere/flash", "cannot be made");
-    refused("--flash-chip", "64Mb", "32Mb");
+    refused("--flash-chip", "128Mb", "64Mb");
     refused("--flash-times", "m25p17", "m25p16-max");
     refused("--flash-faults", "cut=0", "cut=OPERATION[:BYTES]");
     refused("--flash-faults", "cut=1:257", "cut=OPERATION[:BYTES]");

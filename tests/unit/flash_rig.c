@@ -18,14 +18,14 @@ void flash_rig_image(struct flash_rig *const rig, const uint64_t seed, const boo
     rig->options.file_name = rig->xilinx ? fallback ? "7i93_fallback.bit" : "7i93_test.bit" : "7i96s_test.bin";
 }
 
-static int make(void **const state, const char *const profile)
+static int make(void **const state, const char *const profile, const uint8_t flash_id)
 {
     struct flash_rig *const rig = calloc(1, sizeof *rig);
     assert_non_null(rig);
     rig->file = malloc(SIM_FLASH_FILE_BYTES);
     assert_non_null(rig->file);
     rig->xilinx = strcmp(profile, "7i96s") != 0;
-    const struct sim_card_options options = {.profile = profile, .seed = 1};
+    const struct sim_card_options options = {.profile = profile, .seed = 1, .flash_id = flash_id};
     if (sim_card_new(&rig->sim, &options, &rig->diag) != 0)
         fail_msg("%s", rig->diag.text);
     assert_int_equal(sim_net_new(&rig->net, rig->sim, NULL), 0);
@@ -38,12 +38,17 @@ static int make(void **const state, const char *const profile)
 
 int flash_rig_7i93(void **const state)
 {
-    return make(state, "7i93");
+    return make(state, "7i93", 0);
 }
 
 int flash_rig_7i96s(void **const state)
 {
-    return make(state, "7i96s");
+    return make(state, "7i96s", 0);
+}
+
+int flash_rig_unknown_chip(void **const state)
+{
+    return make(state, "7i93", 0x16);
 }
 
 int flash_rig_free(void **const state)

@@ -29,6 +29,7 @@ struct flash_rig {
 /* For cmocka; *state is a struct flash_rig. */
 int flash_rig_7i93(void **state);
 int flash_rig_7i96s(void **state);
+int flash_rig_unknown_chip(void **state); /* a 7I93 */
 int flash_rig_free(void **state);
 
 /* Make another image the one to be written: a good one from a seed, or any. */

@@ -286,6 +286,82 @@ static void a_driver_that_starts_meanwhile_ends_the_job(void **state)
     flash_rig_assert_image(rig, RIG_USER);
 }
 
+/* Reading holds the card up as well: about a millisecond a datagram. */
+static void a_driver_keeps_readers_away_too(void **state)
+{
+    struct flash_rig *const rig = *state;
+    uint8_t *const dump = malloc(rig->flash_bytes);
+    assert_non_null(dump);
+    memcpy(dump, rig->flash, rig->flash_bytes);
+    struct neighbour other = {
+        .link = sim_net_link(rig->net), .rig = rig, .next_ns = link_now_ns(sim_net_link(rig->net))};
+    const uint64_t read = flash_card_counters(rig->card).bytes_read;
+    sim_net_on_taken(rig->net, drive, &other);
+    const int results[] = {
+        flash_job_verify(&rig->job, rig->card, &rig->image, &rig->options, &rig->diag),
+        flash_job_verify_dump(&rig->job, rig->card, dump, rig->flash_bytes, &rig->options, &rig->diag),
+        flash_job_backup(&rig->job, rig->card, dump, rig->flash_bytes, &rig->options, &rig->diag)};
+    for (unsigned i = 0; i < sizeof results / sizeof results[0]; i++)
+        assert_int_equal(results[i], HM2_ERR_STATE);
+    assert_null(rig->job);
+    assert_int_equal(flash_card_counters(rig->card).bytes_read, read);
+    sim_net_on_taken(rig->net, NULL, NULL);
+    free(dump);
+}
+
+static bool driver_starts_while_reading(void *const context, const struct flash_progress *const now)
+{
+    struct neighbour *const other = context;
+    if (now->phase == FLASH_READING && other->next_ns == 0) {
+        other->next_ns = link_now_ns(other->link);
+        sim_net_on_taken(other->rig->net, drive, other);
+    }
+    return true;
+}
+
+static void a_driver_that_starts_meanwhile_ends_a_backup(void **state)
+{
+    struct flash_rig *const rig = *state;
+    uint8_t *const dump = malloc(rig->flash_bytes);
+    assert_non_null(dump);
+    for (unsigned anyway = 0; anyway < 2; anyway++) {
+        struct neighbour other = {.link = sim_net_link(rig->net), .rig = rig};
+        rig->options.any_traffic = anyway;
+        assert_int_equal(flash_job_backup(&rig->job, rig->card, dump, rig->flash_bytes, &rig->options, &rig->diag), 0);
+        assert_int_equal(flash_job_run(rig->job, driver_starts_while_reading, &other, &rig->diag),
+                         anyway ? 0 : HM2_ERR_STATE);
+        assert_non_null(strstr(rig->diag.text, "has begun to talk to this card"));
+        assert_non_null(strstr(rig->diag.text, "Nothing was changed"));
+        sim_net_on_taken(rig->net, NULL, NULL);
+        flash_job_free(rig->job);
+        rig->job = NULL;
+    }
+    assert_memory_equal(dump, rig->flash, rig->flash_bytes);
+    free(dump);
+}
+
+/* ---- a chip that nobody knows (H12)
+ * ------------------------------------------------------------------------------------------------------- */
+
+static void an_unknown_chip_is_never_written(void **state)
+{
+    struct flash_rig *const rig = *state;
+    struct flash_survey survey;
+    uint8_t bytes[64];
+    assert_null(flash_card_info(rig->card)->chip);
+    flash_rig_assert_refused(rig, HM2_ERR_MISMATCH, "the flash chip's ID is 0x16 and the card gives its size as");
+    rig->options.override = "7I93";
+    flash_rig_assert_refused(rig, HM2_ERR_MISMATCH, "it can be read and not written");
+    assert_int_equal(flash_job_restore(&rig->job, rig->card, rig->flash, rig->flash_bytes, &rig->options, &rig->diag),
+                     HM2_ERR_MISMATCH);
+    assert_int_equal(flash_job_verify(&rig->job, rig->card, &rig->image, &rig->options, &rig->diag), HM2_ERR_MISMATCH);
+    assert_int_equal(flash_job_backup(&rig->job, rig->card, rig->flash, rig->flash_bytes, &rig->options, &rig->diag),
+                     HM2_ERR_UNSUPPORTED);
+    assert_int_equal(flash_card_survey(rig->card, &survey, &rig->diag), HM2_ERR_UNSUPPORTED);
+    assert_int_equal(flash_card_read(rig->card, 0, bytes, sizeof bytes, &rig->diag), 0);
+    assert_memory_equal(bytes, rig->flash, sizeof bytes);
+}
+
 /* ---- dumps (H13)
  * ------------------------------------------------------------------------------------------------------- */
 
@@ -368,6 +444,9 @@ int main(void)
         ON_7I96S(another_tool_shows_in_the_scratch_register),
         ON_7I93(a_card_that_was_quiet_is_asked_again_when_somebody_comes),
         ON_7I93(a_driver_that_starts_meanwhile_ends_the_job),
+        ON_7I93(a_driver_keeps_readers_away_too),
+        ON_7I96S(a_driver_that_starts_meanwhile_ends_a_backup),
+        cmocka_unit_test_setup_teardown(an_unknown_chip_is_never_written, flash_rig_unknown_chip, flash_rig_free),
         ON_7I93(a_dump_of_another_card_is_refused),
         ON_7I96S(a_dump_of_another_card_is_refused),
         cmocka_unit_test(cards_with_a_second_chip_name_its_jumper),

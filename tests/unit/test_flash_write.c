@@ -300,7 +300,7 @@ static void backs_up_and_restores_everything(void **state)
     flash_rig_must_write(rig);
     flash_job_free(rig->job);
     rig->job = NULL;
-    assert_int_equal(flash_job_backup(&rig->job, rig->card, dump, rig->flash_bytes, &rig->diag), 0);
+    assert_int_equal(flash_job_backup(&rig->job, rig->card, dump, rig->flash_bytes, &rig->options, &rig->diag), 0);
     assert_int_equal(flash_job_run(rig->job, NULL, NULL, &rig->diag), 0);
     assert_memory_equal(dump, rig->flash, rig->flash_bytes);
     memset(rig->flash + RIG_USER + RIG_SECTOR, 0, RIG_SECTOR);

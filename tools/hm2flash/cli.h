@@ -43,6 +43,11 @@ int complain(const struct cli *cli, int status, const char *format, ...) __attri
 const char *card_name(const struct cli *cli);
 /* Where the card's address comes from, as its jumpers say. */
 const char *jumper_text(const struct flash_card_info *info);
+/* Refuse when somebody else uses the card. */
+int check_alone(struct cli *cli);
+/* What the flash holds, unless somebody else uses the card: HM2_ERR_STATE. */
+int look_at_flash(struct cli *cli, struct flash_survey *survey);
+#define IN_USE "not looked at while another program uses the card"
 /* May outputs change? By option or by an answer at the terminal; otherwise says what to do. */
 bool confirmed(struct cli *cli);
 /* Refuse when outputs are driven, unless confirmed (what = "Reloading"); or when somebody else uses the card. */

@@ -86,16 +86,20 @@ static void print_card(struct cli *const cli, const char *const address)
     const struct flash_card_info *const info = cli->info;
     const uint8_t *const m = info->mac;
     struct flash_survey survey = {0};
-    const bool known = info->board && info->chip && flash_card_survey(cli->card, &survey, &cli->diag) == 0;
-    hm2_diag_clear(&cli->diag);
-    if (!cli->json) {
-        printf("%-15s  %-10s  firmware %2u  %02X:%02X:%02X:%02X:%02X:%02X  jumpers %u  fallback: %s, user: %s\n",
-               address, card_name(cli), info->firmware, m[0], m[1], m[2], m[3], m[4], m[5], info->jumpers,
-               known ? flash_content_name(survey.fallback) : "?", known ? flash_content_name(survey.user) : "?");
+    if (cli->json) {
+        cli->address = address;
+        (void)do_identify(cli, NULL);
         return;
     }
-    cli->address = address;
-    (void)do_identify(cli, NULL);
+    const int err = info->board && info->chip ? look_at_flash(cli, &survey) : HM2_ERR_UNSUPPORTED;
+    hm2_diag_clear(&cli->diag);
+    printf("%-15s  %-10s  firmware %2u  %02X:%02X:%02X:%02X:%02X:%02X  jumpers %u  ", address, card_name(cli),
+           info->firmware, m[0], m[1], m[2], m[3], m[4], m[5], info->jumpers);
+    if (err == HM2_ERR_STATE)
+        printf("flash: " IN_USE "\n");
+    else
+        printf("fallback: %s, user: %s\n", err == 0 ? flash_content_name(survey.fallback) : "?",
+               err == 0 ? flash_content_name(survey.user) : "?");
 }
 
 /* Ask some at once, collect who answers. */

@@ -98,6 +98,43 @@ static int print_live(struct cli *const cli)
     return DONE;
 }
 
+#define EEPROM_TEXT (5u * (LBP16_EEPROM_BYTES / 2u))
+
+/* All its words, so that they can be put back by hand with elbpcom. */
+static const char *eeprom_text(const struct flash_card_info *const info, char text[const EEPROM_TEXT])
+{
+    for (unsigned i = 0; i < LBP16_EEPROM_BYTES / 2; i++)
+        snprintf(text + (size_t)5 * i, 6, i + 1 < LBP16_EEPROM_BYTES / 2 ? "%04X " : "%04X", info->eeprom[i]);
+    return text;
+}
+
+static void print_eeprom(const struct cli *const cli)
+{
+    enum { ROW = 40 }; /* eight words */
+    char words[EEPROM_TEXT];
+    eeprom_text(cli->info, words);
+    for (unsigned at = 0; at < EEPROM_TEXT; at += ROW)
+        say(cli, "  EEPROM 0x%02X: %.39s\n", at / ROW * 16, words + at);
+}
+
+static int print_contents(struct cli *const cli)
+{
+    struct flash_survey survey;
+    if (!cli->info->board || !cli->info->chip)
+        return DONE;
+    const int err = look_at_flash(cli, &survey);
+    if (err == HM2_ERR_STATE) {
+        hm2_diag_clear(&cli->diag);
+        say(cli, "  flash: " IN_USE "\n");
+        return DONE;
+    }
+    if (err < 0)
+        return report(cli, err);
+    say(cli, "  flash: sector 0: %s, fallback area: %s, user area: %s\n", flash_content_name(survey.sector0),
+        flash_content_name(survey.fallback), flash_content_name(survey.user));
+    return DONE;
+}
+
 static int print_details(struct cli *const cli)
 {
     const struct flash_card_info *const info = cli->info;
@@ -117,17 +154,30 @@ static int print_details(struct cli *const cli)
         "    IP address jumpers at boot: %s\n",
         info->card_name, info->lbp_version, info->firmware, jumper_text(info));
     say(cli, "  EEPROM netmask: %u.%u.%u.%u\n", info->netmask[0], info->netmask[1], info->netmask[2], info->netmask[3]);
+    print_eeprom(cli);
+    return status == DONE ? print_contents(cli) : status;
+}
+
+static int json_contents(struct cli *const cli)
+{
     struct flash_survey survey;
-    if (status == DONE && flash_card_survey(cli->card, &survey, &cli->diag) == 0)
-        say(cli, "  flash: sector 0: %s, fallback area: %s, user area: %s\n", flash_content_name(survey.sector0),
-            flash_content_name(survey.fallback), flash_content_name(survey.user));
-    return status;
+    const int err = look_at_flash(cli, &survey);
+    json_bool(cli, "in_use", err == HM2_ERR_STATE);
+    if (err == HM2_ERR_STATE) {
+        hm2_diag_clear(&cli->diag);
+        return DONE;
+    }
+    if (err < 0)
+        return report(cli, err);
+    json_text(cli, "sector_0", flash_content_name(survey.sector0));
+    json_text(cli, "fallback_area", flash_content_name(survey.fallback));
+    json_text(cli, "user_area", flash_content_name(survey.user));
+    return DONE;
 }
 
 static int print_json(struct cli *const cli)
 {
     const struct flash_card_info *const info = cli->info;
-    struct flash_survey survey;
     char text[64];
     json_begin(cli);
     json_text(cli, "name", info->card_name);
@@ -143,21 +193,16 @@ static int print_json(struct cli *const cli)
     json_text(cli, "eeprom_netmask", text);
     const unsigned led_mode = info->eeprom[LBP16_EEPROM_LED_MODE / 2];
     json_number(cli, "led_mode", led_mode);
+    char words[EEPROM_TEXT];
+    json_text(cli, "eeprom", eeprom_text(info, words));
     json_number(cli, "lbp16", info->lbp_version);
     json_number(cli, "firmware", info->firmware);
     json_text(cli, "jumpers", jumper_text(info));
     json_number(cli, "flash_id", info->flash_id & 0xFFu);
     json_number(cli, "flash_bytes", info->chip ? info->chip->bytes : 0);
-    if (info->board && info->chip) {
-        const int err = flash_card_survey(cli->card, &survey, &cli->diag);
-        if (err < 0)
-            return report(cli, err);
-        json_text(cli, "sector_0", flash_content_name(survey.sector0));
-        json_text(cli, "fallback_area", flash_content_name(survey.fallback));
-        json_text(cli, "user_area", flash_content_name(survey.user));
-    }
+    const int status = info->board && info->chip ? json_contents(cli) : DONE;
     json_end(cli);
-    return DONE;
+    return status;
 }
 
 int do_identify(struct cli *const cli, const char *const arg)

@@ -287,11 +287,22 @@ bool confirmed(struct cli *const cli)
     return cli->confirm_outputs;
 }
 
-int check_machine(struct cli *const cli, const char *const what)
+int check_alone(struct cli *const cli)
+{
+    return cli->any_traffic ? DONE : report(cli, flash_card_quiet(cli->card, &cli->diag));
+}
+
+int look_at_flash(struct cli *const cli, struct flash_survey *const survey)
 {
     const int err = cli->any_traffic ? 0 : flash_card_quiet(cli->card, &cli->diag);
-    if (err < 0)
-        return report(cli, err);
+    return err < 0 ? err : flash_card_survey(cli->card, survey, &cli->diag);
+}
+
+int check_machine(struct cli *const cli, const char *const what)
+{
+    const int status = check_alone(cli);
+    if (status != DONE)
+        return status;
     const int outputs = flash_card_outputs(cli->card, &cli->diag);
     if (outputs < 0)
         return report(cli, outputs);

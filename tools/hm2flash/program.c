@@ -60,15 +60,21 @@ static void remind_second_chip(const struct cli *const cli)
                        card_name(cli), jumper);
 }
 
+static const char whole[] = "whole flash";
+
+static const char *area_text(const struct cli *const cli)
+{
+    return cli->fallback ? "fallback area" : "user area";
+}
+
 /* Which card, which part of it, which file: to be seen before anything happens (H18, H20). */
-static void announce(const struct cli *const cli, const uint8_t *const bytes, const size_t len,
-                     const enum flash_area area)
+static void announce(const struct cli *const cli, const uint8_t *const bytes, const size_t len, const char *const part)
 {
     const uint8_t *const m = cli->info->mac;
     char hash[SHA256_TEXT];
     sha256_text(bytes, len, hash);
-    say(cli, "Board: %s at %s, MAC address %02X:%02X:%02X:%02X:%02X:%02X, %s area\nsha256: '%s'\n", card_name(cli),
-        cli->address, m[0], m[1], m[2], m[3], m[4], m[5], area == FLASH_USER ? "user" : "fallback", hash);
+    say(cli, "Board: %s at %s, MAC address %02X:%02X:%02X:%02X:%02X:%02X, %s\nsha256: '%s'\n", card_name(cli),
+        cli->address, m[0], m[1], m[2], m[3], m[4], m[5], part, hash);
     remind_second_chip(cli);
 }
 
@@ -260,13 +266,12 @@ static int write_image(struct cli *const cli, const char *const path, const uint
     if (status != DONE)
         return status;
     struct flash_options options = options_of(cli, path);
-    announce(cli, bytes, len, options.area);
+    announce(cli, bytes, len, area_text(cli));
     status = look_up_image(cli, bytes, len, known_card);
     if (status != DONE)
         return status;
     options.known_card = known_card[0] ? known_card : NULL;
-    if (!cli->any_traffic)
-        status = report(cli, flash_card_quiet(cli->card, &cli->diag)); /* before the flash is read for the first time */
+    status = check_alone(cli); /* before the flash is read for the first time */
     if (status != DONE)
         return status;
     status = show_boot_difference(cli);
@@ -336,10 +341,11 @@ int do_verify(struct cli *const cli, const char *const arg)
         return REFUSED;
     const bool dump = cli->info->chip && len == cli->info->chip->bytes;
     int status = dump ? DONE : parse_image(cli, bytes, len, &image);
-    remind_second_chip(cli);
+    if (status == DONE)
+        announce(cli, bytes, len, dump ? whole : area_text(cli));
     const struct flash_options options = options_of(cli, arg);
     if (status == DONE && dump)
-        err = flash_job_verify_dump(&job, cli->card, bytes, len, &cli->diag);
+        err = flash_job_verify_dump(&job, cli->card, bytes, len, &options, &cli->diag);
     else if (status == DONE)
         err = flash_job_verify(&job, cli->card, &image, &options, &cli->diag);
     if (status == DONE)
@@ -400,7 +406,8 @@ static int finish_file(const struct cli *const cli, FILE *const file, const char
 static int read_chip(struct cli *const cli, uint8_t *const dump, const size_t len, struct outcome *const outcome)
 {
     struct flash_job *job = NULL;
-    const int err = flash_job_backup(&job, cli->card, dump, len, &cli->diag);
+    const struct flash_options options = options_of(cli, NULL);
+    const int err = flash_job_backup(&job, cli->card, dump, len, &options, &cli->diag);
     if (err < 0)
         return report(cli, err);
     const int status = run(cli, job, outcome);
@@ -473,6 +480,7 @@ static int restore_dump(struct cli *const cli, const char *const path, const uin
         status = check_origin(cli, path);
     if (status != DONE)
         return status;
+    announce(cli, dump, len, whole);
     const struct flash_options options = options_of(cli, path);
     const int err = flash_job_restore(&job, cli->card, dump, len, &options, &cli->diag);
     if (err < 0)
@@ -503,7 +511,6 @@ int do_restore(struct cli *const cli, const char *const arg)
         return REFUSED;
     say(cli, "\nRestoring backup %s FLASH memory on the %s board:\n", cli->info->chip ? cli->info->chip->name : "?",
         card_name(cli));
-    remind_second_chip(cli);
     const int status = restore_dump(cli, arg, dump, len);
     free(dump);
     return status;

@@ -67,7 +67,13 @@ static int put_flash(FILE *const out, struct cli *const cli)
         fputs("</table>\n", out);
         return 0;
     }
-    const int err = flash_card_survey(cli->card, &survey, &cli->diag);
+    const int err = look_at_flash(cli, &survey);
+    if (err == HM2_ERR_STATE) {
+        hm2_diag_clear(&cli->diag);
+        row(out, "Contents", "%s", IN_USE);
+        fputs("</table>\n", out);
+        return 0;
+    }
     if (err < 0)
         return err;
     const struct flash_range user = flash_area_range(info->board->family, info->chip, FLASH_USER);

@@ -91,11 +91,6 @@ static int set_ports(struct cli *const cli, const bool modules)
     return report(cli, err);
 }
 
-static int check_alone(struct cli *const cli)
-{
-    return cli->any_traffic ? DONE : report(cli, flash_card_quiet(cli->card, &cli->diag));
-}
-
 int do_enable_all(struct cli *const cli, const char *const arg)
 {
     (void)arg;

@@ -18,7 +18,7 @@
 
 bool flash_chip_option(const char *const text, uint8_t *const id)
 {
-    static const char *const names[] = {"2Mb", "4Mb", "8Mb", "16Mb", "32Mb"};
+    static const char *const names[] = {"2Mb", "4Mb", "8Mb", "16Mb", "32Mb", "64Mb"};
     enum { FIRST_ID = 0x11 };
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         if (strcmp(names[i], text) != 0)

@@ -516,7 +516,7 @@ static void print_help(void)
           "  --name NAME         card name that it reports, in place of its type's\n"
           "  --mac XX:XX:XX:XX:XX:XX\n"
           "  --flash FILE        keep the configuration flash in a file\n"
-          "  --flash-chip SIZE   2Mb, 4Mb, 8Mb, 16Mb (the usual one), 32Mb\n"
+          "  --flash-chip SIZE   2Mb, 4Mb, 8Mb, 16Mb (the usual one), 32Mb, 64Mb\n"
           "  --flash-times NAME  none, m25p16, m25p16-max, w25q16, w25q16-max\n"
           "  --flash-faults LIST cut=OPERATION[:BYTES], stick=OPERATION, bad=ADDRESS:MASK[:TIMES]; by commas\n"
           "  --jumpers N         address jumpers, 0 to 3; with 3 Efinix cards start the fallback image\n"
@@ -589,7 +589,7 @@ static int take_flash_option(struct reading *const r, const int option, const ch
     switch (option) {
     case OPT_FLASH_CHIP:
         return flash_chip_option(value, &flash->id) ? 0
-                                                    : refuse(r, "--flash-chip", value, "2Mb, 4Mb, 8Mb, 16Mb or 32Mb");
+                                                    : refuse(r, "--flash-chip", value, "2Mb, 4Mb, 8Mb, 16Mb, 32Mb or 64Mb");
     case OPT_FLASH_TIMES:
         flash->times = sim_flash_times_of(value);
         return flash->times ? 0 : refuse(r, "--flash-times", value, "none, m25p16, m25p16-max, w25q16 or w25q16-max");

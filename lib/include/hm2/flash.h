@@ -185,7 +185,7 @@ struct flash_counters {
 };
 HM2_API struct flash_counters flash_card_counters(const struct flash_card *card);
 
-/* First pages of sector 0 and of both areas. */
+/* First pages of sector 0 and of both areas. Reads the flash: ask flash_card_quiet() before. */
 struct flash_survey {
     enum flash_content sector0, fallback, user;
 };
@@ -272,18 +272,20 @@ struct flash_job;
 HM2_API int HM2_MUST_CHECK flash_job_write(struct flash_job **job, struct flash_card *card,
                                            const struct flash_image *image, const struct flash_options *options,
                                            struct hm2_diag *diag);
-/* The same without writing: is this image in that area? */
+/* The same without writing: is this image in that area? Like all jobs it is refused while somebody else uses the card
+ * (HM2_ERR_STATE; see flash_card_quiet()), and ends when somebody begins to: long replies would delay a driver's. */
 HM2_API int HM2_MUST_CHECK flash_job_verify(struct flash_job **job, struct flash_card *card,
                                             const struct flash_image *image, const struct flash_options *options,
                                             struct hm2_diag *diag);
 /* A dump of the whole chip: compared, or written (user area, fallback area, boot block; never two of them at once). */
 HM2_API int HM2_MUST_CHECK flash_job_verify_dump(struct flash_job **job, struct flash_card *card, const uint8_t *dump,
-                                                 size_t len, struct hm2_diag *diag);
+                                                 size_t len, const struct flash_options *options,
+                                                 struct hm2_diag *diag);
 HM2_API int HM2_MUST_CHECK flash_job_restore(struct flash_job **job, struct flash_card *card, const uint8_t *dump,
                                              size_t len, const struct flash_options *options, struct hm2_diag *diag);
 /* Read the whole chip into the caller's memory, of the chip's size. */
 HM2_API int HM2_MUST_CHECK flash_job_backup(struct flash_job **job, struct flash_card *card, uint8_t *dump, size_t len,
-                                            struct hm2_diag *diag);
+                                            const struct flash_options *options, struct hm2_diag *diag);
 HM2_API void flash_job_free(struct flash_job *job);
 
 /* One step: at most one datagram's worth of work with its tries, or one erase. 1 = go on, 0 = done, or an error.

@@ -38,7 +38,7 @@ struct sim_card_options {
     uint8_t ip[4];                 /* address of the card, also in the EEPROM; zeros = those of the profile */
     uint8_t mac[6];                /* zeros = Mesa's prefix and three bytes from the seed */
     enum sim_bus bus;
-    uint8_t flash_id; /* of another flash chip than the profile's, 0x11 to 0x15; see hm2/sim_flash.h */
+    uint8_t flash_id; /* of another flash chip than the profile's, 0x11 to 0x16; see hm2/sim_flash.h */
     enum sim_sources sources;
 };
 
