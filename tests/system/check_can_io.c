@@ -24,6 +24,7 @@ static const char *const cases[] = {
     "a_flood_leaves_the_newest_value",
     "a_full_bus_loses_nothing",
     "the_cable_is_pulled",
+    "the_interface_is_replugged",
     "error_frames_are_understood",
     "a_drive_is_started_and_enabled",
     "a_drive_follows_its_setpoints",
