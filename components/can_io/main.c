@@ -33,6 +33,7 @@ MODULE_LICENSE("GPL");
 
 #define MAX_BUSES     8
 #define SUPERVISE_NS  50000000L
+#define RESTART_PAUSE 20u /* of these: a second */
 #define CLOSE_STEP_NS 1000000L
 #define CLOSE_STEPS   2000u
 
@@ -76,7 +77,8 @@ struct bus {
     unsigned refused_index; /* of one that could not be opened, which has been told */
     atomic_bool busy;       /* one of its functions runs */
     bool has_controller;
-    bool was_off; /* when its controller was asked last */
+    bool was_off;   /* when its controller was asked last */
+    unsigned pause; /* rounds until it may be restarted by itself again */
 };
 
 static int component_id;
@@ -141,8 +143,17 @@ static void ask_controller(struct bus *const b)
     *b->points->state = state;
 }
 
-static void restart(const struct bus *const b)
+static bool must_restart(struct bus *const b)
 {
+    if (b->pause > 0)
+        b->pause--;
+    return *b->points->restart ||
+           (*b->points->auto_restart && *b->points->state == CONTROLLER_BUS_OFF && b->pause == 0);
+}
+
+static void restart(struct bus *const b)
+{
+    b->pause = RESTART_PAUSE;
     if (controller_restart(b->interface) == 0)
         ++*b->points->restarts;
     else
@@ -192,7 +203,7 @@ static void supervise(void)
         *b->points->link_up = controller_link_up(b->interface);
         if (b->has_controller)
             ask_controller(b);
-        if (*b->points->restart || (*b->points->auto_restart && *b->points->state == CONTROLLER_BUS_OFF))
+        if (must_restart(b))
             restart(b);
     }
 }

@@ -26,6 +26,7 @@ static const char *const cases[] = {
     "the_cable_is_pulled",
     "the_interface_is_replugged",
     "error_frames_are_understood",
+    "a_controller_leaves_its_bus_and_is_restarted",
     "a_drive_is_started_and_enabled",
     "a_drive_follows_its_setpoints",
     "a_drives_fault_is_told_and_reset",
