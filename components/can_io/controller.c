@@ -20,7 +20,15 @@ enum controller_state controller_state(const char *const interface)
 
 int controller_restart(const char *const interface)
 {
-    return can_do_restart(interface);
+    __u32 restart_ms = 0;
+    if (can_do_restart(interface) == 0)
+        return 0;
+    /* Some drivers cannot; stopped and started, their controller begins anew, too. With restart-ms the kernel does it.
+     */
+    if (controller_state(interface) != CONTROLLER_BUS_OFF || can_get_restart_ms(interface, &restart_ms) != 0 ||
+        restart_ms != 0 || can_do_stop(interface) != 0)
+        return -1;
+    return can_do_start(interface);
 }
 #else
 enum controller_state controller_state(const char *const interface)

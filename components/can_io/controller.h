@@ -19,7 +19,7 @@ enum controller_state { /* as the kernel numbers them */
 };
 
 enum controller_state controller_state(const char *interface);
-/* 0, or -1 when the kernel did not do it. */
+/* 0, or -1 when the kernel did not do it, as when the controller is not bus-off. */
 int controller_restart(const char *interface);
 /* Whether the interface is up and has a carrier. */
 bool controller_link_up(const char *interface);

@@ -10,6 +10,7 @@
  * priority: state of the controller, restart after bus-off.
  */
 #include <errno.h>
+#include <net/if.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,6 +33,7 @@ MODULE_LICENSE("GPL");
 
 #define MAX_BUSES     8
 #define SUPERVISE_NS  50000000L
+#define RESTART_PAUSE 20u /* of these: a second */
 #define CLOSE_STEP_NS 1000000L
 #define CLOSE_STEPS   2000u
 
@@ -48,7 +50,7 @@ RTAPI_MP_ARRAY_INT(floats, MAX_BUSES, "1 = every pin that is not a bit is a floa
 
 struct supervision {
     hm2_bit_t *link_up, *restart, *auto_restart;
-    hm2_u32_t *state, *restarts, *restart_errors;
+    hm2_u32_t *state, *restarts, *restart_errors, *reopened;
 };
 
 static const struct hm2_point points[] = {
@@ -62,6 +64,8 @@ static const struct hm2_point points[] = {
     HM2_POINT(struct supervision, restarts, "restarts", HM2_U32, HM2_PIN_OUT, 0, "", "restarts that were done"),
     HM2_POINT(struct supervision, restart_errors, "restart-errors", HM2_U32, HM2_PIN_OUT, 0, "",
               "restarts that the kernel refused"),
+    HM2_POINT(struct supervision, reopened, "reopened", HM2_U32, HM2_PIN_OUT, 0, "",
+              "times that the interface was back after it had gone away, and is used again"),
 };
 
 struct bus {
@@ -69,9 +73,12 @@ struct bus {
     struct hm2_can *can;
     struct supervision *points;
     const char *interface;
-    atomic_bool busy; /* one of its functions runs */
+    unsigned index;         /* of the interface that is used */
+    unsigned refused_index; /* of one that could not be opened, which has been told */
+    atomic_bool busy;       /* one of its functions runs */
     bool has_controller;
-    bool was_off; /* when its controller was asked last */
+    bool was_off;   /* when its controller was asked last */
+    unsigned pause; /* rounds until it may be restarted by itself again */
 };
 
 static int component_id;
@@ -136,8 +143,17 @@ static void ask_controller(struct bus *const b)
     *b->points->state = state;
 }
 
-static void restart(const struct bus *const b)
+static bool must_restart(struct bus *const b)
 {
+    if (b->pause > 0)
+        b->pause--;
+    return *b->points->restart ||
+           (*b->points->auto_restart && *b->points->state == CONTROLLER_BUS_OFF && b->pause == 0);
+}
+
+static void restart(struct bus *const b)
+{
+    b->pause = RESTART_PAUSE;
     if (controller_restart(b->interface) == 0)
         ++*b->points->restarts;
     else
@@ -145,14 +161,49 @@ static void restart(const struct bus *const b)
     *b->points->restart = false;
 }
 
+static int open_socket(struct bus *const b, struct hm2_can_bus **const socket, struct hm2_diag *const diag)
+{
+    struct hm2_can_filter *const filters = calloc(b->dbc->message_count, sizeof *filters);
+    if (!filters)
+        return HM2_ERR_NOMEM;
+    const unsigned count = hm2_can_filters(b->can, filters, b->dbc->message_count);
+    b->index = if_nametoindex(b->interface);
+    const int err = hm2_can_open(b->interface, filters, count, hm2_can_needs_fd(b->can), socket, diag);
+    free(filters);
+    return err;
+}
+
+/* An interface that was unplugged and plugged in has a new index, and the socket is none of its own. */
+static void look_for_interface(struct bus *const b)
+{
+    const unsigned index = if_nametoindex(b->interface), before = b->index;
+    struct hm2_can_bus *socket;
+    struct hm2_diag diag;
+    hm2_can_close_old(b->can);
+    if (index == 0 || index == before)
+        return;
+    hm2_diag_clear(&diag);
+    if (open_socket(b, &socket, &diag) == 0) {
+        hm2_can_replace_bus(b->can, socket);
+        b->has_controller = controller_state(b->interface) != CONTROLLER_UNKNOWN;
+        ++*b->points->reopened;
+        return;
+    }
+    b->index = before; /* tried again: it may not be set up yet */
+    if (index != b->refused_index)
+        messenger_print_diag("can_io", b->interface, &diag);
+    b->refused_index = index;
+}
+
 static void supervise(void)
 {
     for (unsigned i = 0; i < bus_count; i++) {
         struct bus *const b = &buses[i];
+        look_for_interface(b);
         *b->points->link_up = controller_link_up(b->interface);
         if (b->has_controller)
             ask_controller(b);
-        if (*b->points->restart || (*b->points->auto_restart && *b->points->state == CONTROLLER_BUS_OFF))
+        if (must_restart(b))
             restart(b);
     }
 }
@@ -202,13 +253,8 @@ static int read_dbc(struct bus *const b, const char *const path)
 static int connect_bus(struct bus *const b, const struct hm2_can_options *const options, struct hm2_diag *const diag)
 {
     struct hm2_can_bus *socket;
-    struct hm2_can_filter *const filters = calloc(b->dbc->message_count, sizeof *filters);
-    int err = filters ? hm2_can_new(b->dbc, options, &b->can, diag) : HM2_ERR_NOMEM;
-    if (!err) {
-        const unsigned count = hm2_can_filters(b->can, filters, b->dbc->message_count);
-        err = hm2_can_open(b->interface, filters, count, hm2_can_needs_fd(b->can), &socket, diag);
-    }
-    free(filters);
+    int err = hm2_can_new(b->dbc, options, &b->can, diag);
+    err = err ? err : open_socket(b, &socket, diag);
     return err ? err : hm2_can_setup(b->can, socket, &hal.binder, diag);
 }
 

@@ -36,6 +36,7 @@ struct can_rx {
     int64_t request_due_ns;
     bool received; /* ever */
     bool fresh;    /* data came in this cycle and is not applied yet */
+    bool cut;      /* the bus was lost after the newest frame */
     uint8_t data[HM2_CAN_MAX_BYTES];
 };
 
@@ -68,6 +69,9 @@ struct hm2_can {
     struct hm2_can_options options;
     int node;
     struct hm2_can_bus *bus;
+    /* Handed over by another thread, and back to it. */
+    _Atomic(struct hm2_can_bus *) next_bus, old_bus;
+    uint32_t old_overruns; /* of the buses before */
     struct can_bus_points *points;
     struct can_rx *rx; /* in the order of their keys */
     unsigned rx_count;
@@ -86,6 +90,9 @@ static inline uint32_t can_key(const uint32_t id, const bool extended)
     return id | (extended ? 0x80000000u : 0);
 }
 
+/* What was received counts as old, and what is sent on change as not sent. */
+void can_lost(struct hm2_can *can);
+void can_set_down(struct hm2_can *can, bool down);
 void can_error_frame(struct hm2_can *can, const struct hm2_can_frame *frame);
 
 #endif

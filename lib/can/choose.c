@@ -144,6 +144,12 @@ int hm2_can_new(const struct hm2_dbc *const dbc, const struct hm2_can_options *c
     return err;
 }
 
+static void close_bus(struct hm2_can_bus *const bus)
+{
+    if (bus)
+        bus->ops->close(bus);
+}
+
 void hm2_can_free(struct hm2_can *const can)
 {
     if (!can)
@@ -154,9 +160,20 @@ void hm2_can_free(struct hm2_can *const can)
         free(can->tx[i].base.pins);
     free(can->rx);
     free(can->tx);
-    if (can->bus)
-        can->bus->ops->close(can->bus);
+    close_bus(can->bus);
+    close_bus(atomic_load(&can->next_bus));
+    close_bus(atomic_load(&can->old_bus));
     free(can);
+}
+
+void hm2_can_replace_bus(struct hm2_can *const can, struct hm2_can_bus *const bus)
+{
+    close_bus(atomic_exchange(&can->next_bus, bus)); /* one that no cycle has taken */
+}
+
+void hm2_can_close_old(struct hm2_can *const can)
+{
+    close_bus(atomic_exchange(&can->old_bus, NULL));
 }
 
 unsigned hm2_can_filters(const struct hm2_can *const can, struct hm2_can_filter *const filters, const unsigned max)

@@ -55,6 +55,7 @@ static void take_data(struct hm2_can *const can, struct can_rx *const rx, const 
     rx->at_ns = now_ns;
     rx->received = true;
     rx->fresh = true;
+    rx->cut = false;
     ++*rx->points->count;
     *can->points->hardware_stamps = frame->hardware_stamp;
     if (rx->base.multiplexed) /* the next frame may bring other signals */
@@ -78,7 +79,7 @@ static void take_frames(struct hm2_can *const can, const int64_t now_ns)
     for (unsigned taken = 0; taken < HM2_CAN_FRAMES_PER_CYCLE;) {
         const int count = can->bus->ops->receive(can->bus, can->frames, COUNT(can->frames));
         if (count != 0)
-            *can->points->down = count < 0;
+            can_set_down(can, count < 0);
         for (int i = 0; i < count; i++)
             take_frame(can, &can->frames[i], now_ns);
         if (count < (int)COUNT(can->frames))
@@ -93,7 +94,47 @@ static void show_age(const struct hm2_can *const can, const struct can_rx *const
     const int64_t age_ns = now_ns - (rx->received ? rx->at_ns : can->started_ns);
     const int64_t timeout_ns = *rx->points->timeout_ms * NS_PER_MS;
     *rx->points->age = (double)age_ns * S_PER_NS;
-    *rx->points->timed_out = !rx->received || (timeout_ns != 0 && age_ns > timeout_ns);
+    *rx->points->timed_out = !rx->received || rx->cut || (timeout_ns != 0 && age_ns > timeout_ns);
+}
+
+/* ---- a bus that is lost, and comes back
+ * --------------------------------------------------------------------------------- */
+
+void can_lost(struct hm2_can *const can)
+{
+    for (unsigned i = 0; i < can->rx_count; i++)
+        can->rx[i].cut = true;
+    for (unsigned i = 0; i < can->tx_count; i++)
+        can->tx[i].sent = false;
+}
+
+void can_set_down(struct hm2_can *const can, const bool down)
+{
+    if (down && !*can->points->down)
+        can_lost(can);
+    *can->points->down = down;
+}
+
+/* What was sent into a bus-off controller was lost, too. */
+static void set_bus_off(struct hm2_can *const can, const bool bus_off)
+{
+    if (bus_off != *can->points->bus_off)
+        can_lost(can);
+    *can->points->bus_off = bus_off;
+    if (!bus_off)
+        *can->points->error_passive = *can->points->error_warning = false;
+}
+
+static void take_bus(struct hm2_can *const can)
+{
+    if (!atomic_load_explicit(&can->next_bus, memory_order_relaxed) || atomic_load(&can->old_bus))
+        return;
+    struct hm2_can_bus *const old = can->bus;
+    can->bus = atomic_exchange(&can->next_bus, NULL);
+    can->old_overruns += old->overruns;
+    atomic_store(&can->old_bus, old);
+    can_lost(can);
+    *can->points->down = false;
 }
 
 void hm2_can_tell_bus_off(struct hm2_can *const can, const bool bus_off)
@@ -104,10 +145,8 @@ void hm2_can_tell_bus_off(struct hm2_can *const can, const bool bus_off)
 static void hear_state(struct hm2_can *const can)
 {
     const int told = atomic_exchange(&can->told, CAN_TOLD_NOTHING);
-    if (told == CAN_TOLD_BUS_OFF)
-        *can->points->bus_off = true;
-    else if (told == CAN_TOLD_ON_BUS)
-        *can->points->bus_off = *can->points->error_passive = *can->points->error_warning = false;
+    if (told != CAN_TOLD_NOTHING)
+        set_bus_off(can, told == CAN_TOLD_BUS_OFF);
 }
 
 void hm2_can_read(struct hm2_can *const can, const int64_t now_ns)
@@ -115,6 +154,7 @@ void hm2_can_read(struct hm2_can *const can, const int64_t now_ns)
     if (!can->started)
         can->started_ns = now_ns;
     can->started = true;
+    take_bus(can);
     hear_state(can);
     take_frames(can, now_ns);
     for (unsigned i = 0; i < can->rx_count; i++) {
@@ -122,7 +162,7 @@ void hm2_can_read(struct hm2_can *const can, const int64_t now_ns)
             apply(can, &can->rx[i]);
         show_age(can, &can->rx[i], now_ns);
     }
-    *can->points->overruns = can->bus->overruns;
+    *can->points->overruns = can->old_overruns + can->bus->overruns;
 }
 
 /* ---- error frames (linux/can/error.h)
@@ -149,7 +189,7 @@ void can_error_frame(struct hm2_can *const can, const struct hm2_can_frame *cons
         *p->rx_error_counter = frame->data[7];
     }
     if (frame->id & ERROR_BUS_OFF)
-        *p->bus_off = true;
+        set_bus_off(can, true);
     if (frame->id & ERROR_RESTARTED)
-        *p->bus_off = *p->error_passive = *p->error_warning = false;
+        set_bus_off(can, false);
 }

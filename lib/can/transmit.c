@@ -8,7 +8,7 @@ static bool hand_over(struct hm2_can *const can, const struct hm2_can_frame *con
 {
     const int err = can->bus->ops->send(can->bus, frame);
     if (err != HM2_ERR_NOSPACE)
-        *can->points->down = err != 0;
+        can_set_down(can, err != 0);
     if (!err)
         ++*can->points->sent;
     return !err;

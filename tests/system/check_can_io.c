@@ -24,7 +24,14 @@ static const char *const cases[] = {
     "a_flood_leaves_the_newest_value",
     "a_full_bus_loses_nothing",
     "the_cable_is_pulled",
+    "the_interface_is_replugged",
     "error_frames_are_understood",
+    "a_controller_leaves_its_bus_and_is_restarted",
+    "a_drive_is_started_and_enabled",
+    "a_drive_follows_its_setpoints",
+    "a_drives_fault_is_told_and_reset",
+    "a_lost_heartbeat_is_told",
+    "a_node_is_guarded",
     "bad_loads_are_explained",
 };
 #define CASES ((int)(sizeof cases / sizeof cases[0]))

@@ -24,6 +24,7 @@
 static const struct component {
     const char *name, *arguments, *function;
 } components[] = {
+    {"can_cia402", "count=2", "cia402.update"},
     {"can_io", NULL, NULL},   /* needs a CAN bus */
     {"hm2_7i65", NULL, NULL}, /* needs a card with buffered SPI */
     {"hm2_lbp16", "board_ip=192.168.1.121", "hm2_7i96s.0.read"},

@@ -291,6 +291,7 @@ static const struct {
 } components[] = {
     {"scurve", "loadrt scurve", "scurve.0."},
     {"recorder", "loadrt recorder file=/dev/null", "recorder."},
+    {"can_cia402", "loadrt can_cia402", "cia402.0."},
 };
 #define COMPONENTS ((int)(sizeof components / sizeof components[0]))
 

@@ -467,6 +467,90 @@ static void error_frames_tell_the_controllers_state(void **state)
     expect("frames-received", 0);
 }
 
+static void what_was_lost_is_flagged_and_sent_again(void **state)
+{
+    (void)state;
+    set("Status.rx-timeout-ms", 0);
+    comes(32, "\x01\x00\x00\x00", 4);
+    cycle();
+    expect("Status.rx-timed-out", 0);
+    assert_int_equal(sent(17), 1);
+    bus.receive_result = HM2_ERR_IO;
+    cycle();
+    expect("Status.rx-timed-out", 1);
+    expect("Status.word", 1);
+    bus.receive_result = 0;
+    cycle();
+    assert_int_equal(sent(17), 2);
+    expect("Status.rx-timed-out", 1);
+    comes(32, "\x02\x00\x00\x00", 4);
+    cycle();
+    expect("Status.rx-timed-out", 0);
+    assert_int_equal(sent(17), 2);
+    hm2_can_tell_bus_off(can, true);
+    cycle();
+    expect("Status.rx-timed-out", 1);
+    const unsigned before = sent(17);
+    hm2_can_tell_bus_off(can, false);
+    cycle();
+    assert_int_equal(sent(17), before + 1u); /* the controller has dropped what was sent meanwhile */
+}
+
+static struct hm2_can_bus other;
+static unsigned other_sent, other_closed;
+
+static int other_receive(struct hm2_can_bus *const base, struct hm2_can_frame *const frames, const unsigned max)
+{
+    (void)base;
+    (void)frames;
+    (void)max;
+    return 0;
+}
+
+static int other_send(struct hm2_can_bus *const base, const struct hm2_can_frame *const frame)
+{
+    (void)base;
+    other_sent += frame->id == 17u;
+    return 0;
+}
+
+static void other_close(struct hm2_can_bus *const base)
+{
+    (void)base;
+    other_closed++;
+}
+
+static const struct hm2_can_bus_ops other_ops = {other_receive, other_send, other_close};
+
+static void an_interface_that_comes_back_takes_the_place_of_the_old_one(void **state)
+{
+    (void)state;
+    other = (struct hm2_can_bus){.ops = &other_ops, .overruns = 3};
+    other_sent = other_closed = 0;
+    bus.base.overruns = 2;
+    comes(32, "\x01\x00\x00\x00", 4);
+    cycle();
+    hm2_can_close_old(can); /* there is none */
+    hm2_can_replace_bus(can, &other);
+    assert_false(bus.closed);
+    cycle();
+    expect("Status.rx-timed-out", 1);
+    expect("frames-lost", 5);
+    expect("interface-down", 0);
+    assert_int_equal(other_sent, 1);
+    hm2_can_close_old(can);
+    assert_true(bus.closed);
+    hm2_can_close_old(can);
+    /* One that no cycle took is closed by the next one, and by the end. */
+    struct hm2_can_bus more = {.ops = &other_ops}, most = {.ops = &other_ops};
+    hm2_can_replace_bus(can, &more);
+    hm2_can_replace_bus(can, &most);
+    assert_int_equal(other_closed, 1);
+    hm2_can_free(can);
+    can = NULL;
+    assert_int_equal(other_closed, 3);
+}
+
 static void the_end_of_bus_off_can_be_told(void **state)
 {
     (void)state;
@@ -506,6 +590,8 @@ int main(void)
         WITH_DRIVE(a_full_queue_is_tried_again_with_the_newest_value),
         WITH_DRIVE(an_interface_that_is_down_is_told_and_comes_back),
         WITH_DRIVE(error_frames_tell_the_controllers_state),
+        WITH_DRIVE(what_was_lost_is_flagged_and_sent_again),
+        WITH_DRIVE(an_interface_that_comes_back_takes_the_place_of_the_old_one),
         WITH_DRIVE(the_end_of_bus_off_can_be_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -15,6 +15,9 @@
  * millisecond (21 frames each, at 47 bits a frame), so what waits is always worked off. A frame that is shorter than
  * its message is dropped as a whole. In the same cycle the messages that are due are sent, in the order of the file.
  *
+ * When the interface is down, has gone away or is bus-off, every message that is received counts as timed out until it
+ * comes again, and those that are sent on change are sent again afterwards.
+ *
  * hm2_can_read() and hm2_can_write() are realtime safe (no allocation, lock or formatting, no system call but those of
  * the bus) and must be called from one thread.
  */
@@ -108,6 +111,12 @@ HM2_API void hm2_can_write(struct hm2_can *can, int64_t now_ns);
 /* Somebody who asked the controller itself says whether it is bus-off: the next cycle shows it. Drivers report bus-off
  * by an error frame, but not all of them its end. May be called from any thread, at any time. */
 HM2_API void hm2_can_tell_bus_off(struct hm2_can *can, bool bus_off);
+
+/* An interface that went away and came back is another one for the kernel. Whoever sees it there opens it and hands it
+ * over: the next cycle uses it in place of the present one, which hm2_can_close_old() closes later. Takes over the bus.
+ * Both from one thread, not realtime safe. */
+HM2_API void hm2_can_replace_bus(struct hm2_can *can, struct hm2_can_bus *bus);
+HM2_API void hm2_can_close_old(struct hm2_can *can);
 
 /* The tables of points; ended by a group without points. */
 HM2_API const struct hm2_point_group *hm2_can_point_groups(void);
