@@ -77,7 +77,7 @@ MODBUS_LIBS ?= $(shell $(PKG_CONFIG) --libs libmodbus 2>/dev/null)
 LIBS_modbus_io := $(MODBUS_LIBS)
 ifeq ($(strip $(MODBUS_LIBS)),)
 COMPONENTS := $(filter-out modbus_io,$(COMPONENTS))
-SYSTEM_TESTS := $(filter-out check_modbus_io check_modbus_rtu,$(SYSTEM_TESTS))
+SYSTEM_TESTS := $(filter-out check_modbus_io check_modbus_rtu check_vfd_spindle,$(SYSTEM_TESTS))
 endif
 
 obj = $(patsubst %.c,$(BUILDDIR)/obj/%.o,$(1))

@@ -32,7 +32,7 @@ void talk_end(struct talk *const talk)
     if (!process_wait_end(&talk->host, END_MS))
         ck_abort_msg("hm2host does not end: %s", talk->host.text);
     if (talk->host.status != 0)
-        ck_abort_msg("hm2host ended with %d: %s", talk->host.status, talk->host.text);
+        ck_abort_msg("hm2host ended with %d: %.4000s", talk->host.status, talk->host.text);
     (void)process_stop(&talk->host, 0, 0);
 }
 
