@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * modbus_io against servers of libmodbus and pymodbus, over TCP and over a pseudo-terminal, with their faults, and
- * against LinuxCNC's own mb2hal with the same file.
+ * against LinuxCNC's own mb2hal with the same file; hm2_mb2hal against mb2hal under LinuxCNC.
  */
 #include <check.h>
 #include <errno.h>
@@ -518,26 +518,41 @@ END_TEST
 
 /* ---- peers -------------------------------------------------------------------------------------------------------*/
 
-START_TEST(debians_mb2hal_has_the_same_pins_and_writes_the_same)
+/* What a program under halrun makes of all.ini; false when this machine cannot run it. */
+static bool run_program(struct process *const halrun, const char *const program, struct device *const after)
 {
-    static struct process halrun;
-    static struct device after_mb2hal, before;
     static const struct mb2hal_pin until[] = {{"mb2hal.02.01.int", "1008"},
                                               {"mb2hal.03.00.int", "65535"},
                                               {"mb2hal.ins.b.bit", "TRUE"},
                                               {"mb2hal.00.01.bit", "TRUE"},
                                               {NULL, NULL}};
-    write_file("all.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=8\n", tcp_link(), all_types);
+    struct device before;
     memcpy(&before, device, sizeof before);
-    start_server();
-    if (!mb2hal_start(&halrun, folder, "mb2hal", "all.ini", settings, until)) {
-        printf("%s", halrun.text);
-        return;
+    if (!mb2hal_start(halrun, folder, program, "all.ini", settings, until)) {
+        printf("%s", halrun->text);
+        return false;
     }
     await_writes();
-    mb2hal_finish(&halrun, folder);
-    memcpy(&after_mb2hal, device, sizeof after_mb2hal);
+    mb2hal_finish(halrun, folder);
+    memcpy(after, device, sizeof *after);
     memcpy(device, &before, sizeof before);
+    return true;
+}
+
+static void expect_same_tables(const struct device *const a, const struct device *const b)
+{
+    ck_assert_mem_eq(a->coils, b->coils, sizeof a->coils);
+    ck_assert_mem_eq(a->holding, b->holding, sizeof a->holding);
+}
+
+START_TEST(debians_mb2hal_has_the_same_pins_and_writes_the_same)
+{
+    static struct process halrun;
+    static struct device after_mb2hal;
+    write_file("all.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=8\n", tcp_link(), all_types);
+    start_server();
+    if (!run_program(&halrun, "mb2hal", &after_mb2hal))
+        return;
     load(path("all.ini"));
     talk_do(&hal, "%sstart", settings);
     await_writes();
@@ -546,9 +561,27 @@ START_TEST(debians_mb2hal_has_the_same_pins_and_writes_the_same)
     await_pin("mb2hal.ins.b.bit", 1, 1);
     await_pin("mb2hal.00.01.bit", 1, 1);
     ck_assert_uint_eq(mb2hal_missing(halrun.text, talk_try(&hal, "show pin")), 0);
-    ck_assert_mem_eq(device->coils, after_mb2hal.coils, sizeof device->coils);
-    ck_assert_mem_eq(device->holding, after_mb2hal.holding, sizeof device->holding);
+    expect_same_tables(device, &after_mb2hal);
     talk_end(&hal);
+}
+END_TEST
+
+START_TEST(hm2_mb2hal_is_mb2hal_with_more_pins)
+{
+    static const char program[] = TEST_BUILD "/linuxcnc/hm2_mb2hal";
+    static struct process theirs, ours;
+    static struct device after_theirs, after_ours;
+    if (access(program, X_OK) != 0) {
+        printf("SKIP: hm2_mb2hal is not built: LinuxCNC's library for programs is missing (linuxcnc-uspace-dev)\n");
+        return;
+    }
+    write_file("all.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=8\n", tcp_link(), all_types);
+    start_server();
+    if (!run_program(&theirs, "mb2hal", &after_theirs) || !run_program(&ours, program, &after_ours))
+        return;
+    ck_assert_uint_eq(mb2hal_missing(theirs.text, ours.text), 0);
+    expect_same_tables(&after_ours, &after_theirs);
+    ck_assert_ptr_nonnull(strstr(ours.text, "mb2hal.02.stale"));
 }
 END_TEST
 
@@ -608,6 +641,7 @@ int main(void)
     tcase_add_test(tests, a_unit_that_is_not_there_does_not_stop_the_others_on_the_line);
     tcase_add_test(tests, a_wrong_file_is_refused_with_its_line_and_files_are_instances);
     tcase_add_test(tests, debians_mb2hal_has_the_same_pins_and_writes_the_same);
+    tcase_add_test(tests, hm2_mb2hal_is_mb2hal_with_more_pins);
     tcase_add_test(tests, a_server_of_pymodbus_gives_back_what_is_written);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);

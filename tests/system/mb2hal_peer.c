@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #define LIMIT_MS 60000
 #define SKIP_MS  1000 /* halrun-user has said by then that it cannot */
@@ -38,9 +39,11 @@ bool mb2hal_start(struct process *const halrun, const char *const folder, const 
                   const char *const config, const char *const settings, const struct mb2hal_pin *const until)
 {
     char text[2000], file[256];
+    snprintf(file, sizeof file, "%s/go", folder);
+    (void)unlink(file); /* of a run before */
     write_wait(folder, until);
-    snprintf(text, sizeof text, "loadusr -Wn mb2hal %s config=%s/%s\n%sloadusr -w %s/wait\nshow pin\n", program, folder,
-             config, settings, folder);
+    snprintf(text, sizeof text, "loadusr -W %s config=%s/%s\n%sloadusr -w %s/wait\nshow pin\n", program, folder, config,
+             settings, folder);
     write_text(folder, "peer.hal", text, 0644);
     snprintf(file, sizeof file, "%s/peer.hal", folder);
     const char *const argv[] = {TEST_SOURCE "/tests/system/halrun-user", file, NULL};
