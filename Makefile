@@ -75,9 +75,12 @@ LIBS_can_io := $(SOCKETCAN_LIBS)
 # modbus_io is built where libmodbus is.
 MODBUS_LIBS ?= $(shell $(PKG_CONFIG) --libs libmodbus 2>/dev/null)
 LIBS_modbus_io := $(MODBUS_LIBS)
+# hm2_mb2hal, a program for LinuxCNC's HAL, is built where its library for programs is, too.
+LINUXCNC_HAL_LIBS ?= $(if $(findstring /,$(shell $(CC) -print-file-name=liblinuxcnchal.so 2>/dev/null)),-llinuxcnchal)
+LINUXCNC_PROGRAMS := $(if $(strip $(LINUXCNC_HAL_LIBS)),$(if $(strip $(MODBUS_LIBS)),$(BUILDDIR)/linuxcnc/hm2_mb2hal))
 ifeq ($(strip $(MODBUS_LIBS)),)
 COMPONENTS := $(filter-out modbus_io,$(COMPONENTS))
-SYSTEM_TESTS := $(filter-out check_modbus_io,$(SYSTEM_TESTS))
+SYSTEM_TESTS := $(filter-out check_modbus_io check_modbus_rtu check_vfd_spindle,$(SYSTEM_TESTS))
 endif
 
 obj = $(patsubst %.c,$(BUILDDIR)/obj/%.o,$(1))
@@ -222,7 +225,20 @@ $(BUILDDIR)/linuxcnc/$(1).so: $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc/%.o,$(wild
 endef
 $(foreach c,$(COMPONENTS),$(eval $(call linuxcnc_rule,$(c))))
 
-linuxcnc: $(LINUXCNC_SO) ## build the components for the LinuxCNC that is installed
+# The sources of modbus_io, all but its main, as a program: RTAPI's side for programs is called ULAPI.
+MB2HAL_SRC := $(filter-out %/main.c,$(wildcard components/modbus_io/*.c)) $(COMPONENT_COMMON) \
+	$(wildcard components/modbus_io/userspace/*.c)
+MB2HAL_OBJ := $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc-user/%.o,$(MB2HAL_SRC))
+$(BUILDDIR)/obj/linuxcnc-user/%.o: %.c $(FLAGS)
+	@mkdir -p $(@D)
+	$(call say,CC,$< (LinuxCNC program))$(CC) $(ALL_CPPFLAGS) -Icomponents -DHM2_VERSION='"$(VERSION)"' -DULAPI \
+		$(filter-out -DRTAPI -Drealtime -D__MODULE__,$(LINUXCNC_FLAGS)) \
+		$(filter-out -Wpedantic -Wmissing-prototypes,$(ALL_CFLAGS)) -MD -MP -c -o $@ $<
+$(BUILDDIR)/linuxcnc/hm2_mb2hal: $(MB2HAL_OBJ) $(LIB_A)
+	@mkdir -p $(@D)
+	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $^ $(MODBUS_LIBS) $(LINUXCNC_HAL_LIBS) -lm -lpthread
+
+linuxcnc: $(LINUXCNC_SO) $(LINUXCNC_PROGRAMS) ## build the components for the LinuxCNC that is installed
 
 # The page lists the points from the tables that create them.
 $(BUILDDIR)/man/%: man/%.in $(BUILDDIR)/hm2points
@@ -262,7 +278,7 @@ $(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(HOST_A) $(SIM_A) $(LIB_A)
 		-Wl,--no-whole-archive $(SIM_A) $(LIB_A) -rdynamic -lm -lpthread -ldl
 
 # Some of them load components into LinuxCNC, and skip that where it is not installed.
-$(SYSTEM_BIN): | $(if $(shell command -v $(halcompile)),$(LINUXCNC_SO))
+$(SYSTEM_BIN): | $(if $(shell command -v $(halcompile)),$(LINUXCNC_SO) $(LINUXCNC_PROGRAMS))
 # These load the test components.
 $(BUILDDIR)/unit/test_halhost $(BUILDDIR)/system/check_hm2host: | $(TEST_COMPONENT_SO)
 
@@ -338,9 +354,11 @@ uninstall: ## remove what install put there
 install-linuxcnc: linuxcnc ## install the components where LinuxCNC loads them from, below DESTDIR
 	$(INSTALL) -d $(DESTDIR)$(LINUXCNC_FOLDER)
 	$(INSTALL) -m 644 $(LINUXCNC_SO) $(DESTDIR)$(LINUXCNC_FOLDER)
+	$(if $(LINUXCNC_PROGRAMS),$(INSTALL) -d $(DESTDIR)$(bindir) && $(INSTALL) -m 755 $(LINUXCNC_PROGRAMS) $(DESTDIR)$(bindir))
 
 uninstall-linuxcnc: ## remove what install-linuxcnc put there
-	rm -f $(addprefix $(DESTDIR)$(LINUXCNC_FOLDER)/,$(notdir $(LINUXCNC_SO)))
+	rm -f $(addprefix $(DESTDIR)$(LINUXCNC_FOLDER)/,$(notdir $(LINUXCNC_SO))) \
+		$(addprefix $(DESTDIR)$(bindir)/,$(notdir $(LINUXCNC_PROGRAMS)))
 
 dist: ## source archive of the committed tree
 	@mkdir -p $(BUILDDIR)
@@ -351,4 +369,4 @@ clean: ## remove the build folder
 
 -include $(patsubst %.o,%.d,$(LIB_OBJ) $(SIM_OBJ) $(HOST_OBJ) \
 	$(call obj,$(wildcard tools/*/*.c components/*/*.c tests/*/*.c tests/system/dropin/*.c)) $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc/%.o, \
-	$(wildcard components/*/*.c)))
+	$(wildcard components/*/*.c)) $(MB2HAL_OBJ))

@@ -8,10 +8,6 @@
 #include <hal.h>
 #include <rtapi.h>
 
-#ifndef RTAPI
-#error "components are compiled with -DRTAPI"
-#endif
-
 /* Values are written through the library's types: they must be HAL's (hm2/points.h). */
 _Static_assert(sizeof(hm2_bit_t) == sizeof(hal_bit_t), "bit");
 _Static_assert(sizeof(hm2_s32_t) == sizeof(hal_s32_t), "s32");

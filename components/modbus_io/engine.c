@@ -2,6 +2,7 @@
 #include "engine.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -268,6 +269,20 @@ static void succeed(struct line *const line, struct transaction *const tx, const
     publish(tx);
 }
 
+/* On a serial line no answer says which request it is for. After one that did not come in time the line rests for as
+ * long again, or until it comes, and what came is dropped. */
+static void drop_late_answer(const struct line *const line, const struct transaction *const tx)
+{
+    struct pollfd ready = {.fd = modbus_get_socket(line->modbus), .events = POLLIN};
+    const int64_t until = now() + (int64_t)tx->map->response_timeout_ms * NS_PER_MS;
+    bool came = false;
+    while (!came && now() < until && !atomic_load(&line->engine->ends))
+        came = poll(&ready, 1, (int)(NAP_NS / NS_PER_MS)) > 0;
+    if (came)
+        sleep_ns(line->engine, (int64_t)tx->map->byte_timeout_ms * NS_PER_MS);
+    (void)modbus_flush(line->modbus);
+}
+
 /* Whether another try may be made at once. */
 static bool take_failure(struct line *const line, struct transaction *const tx, const int error)
 {
@@ -284,7 +299,10 @@ static bool take_failure(struct line *const line, struct transaction *const tx, 
         return false;
     }
     forget(line, tx->map);
-    (void)modbus_flush(line->modbus);
+    if (error == ETIMEDOUT || error == EMBBADSLAVE)
+        drop_late_answer(line, tx);
+    else
+        (void)modbus_flush(line->modbus);
     return true;
 }
 

@@ -9,18 +9,13 @@
  * devices, see engine.h.
  */
 #include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include <hal.h>
 #include <rtapi.h>
 #include <rtapi_app.h>
 
 #include "common/hal_binder.h"
-#include "common/messenger.h"
-#include "modbus_io/engine.h"
-#include "modbus_io/pins.h"
+#include "modbus_io/instance.h"
 
 MODULE_AUTHOR("libhm2 developers");
 MODULE_DESCRIPTION("Modbus devices as pins");
@@ -31,11 +26,7 @@ MODULE_LICENSE("GPL");
 static char *config[MAX_INSTANCES];
 RTAPI_MP_ARRAY_STRING(config, MAX_INSTANCES, "file of each instance");
 
-static struct instance {
-    struct hm2_modbus_map *map;
-    struct engine *engine;
-    struct pins *pins;
-} instances[MAX_INSTANCES];
+static struct instance instances[MAX_INSTANCES];
 static unsigned count;
 static int component_id;
 static struct hal_binder hal;
@@ -45,44 +36,9 @@ static void update(void *const argument, const long period_ns)
     pins_update(argument, period_ns);
 }
 
-static char *read_file(const char *const path, size_t *const length)
-{
-    FILE *const file = fopen(path, "re");
-    char *text = file ? malloc(HM2_MODBUS_FILE_BYTES + 1u) : NULL;
-    if (text)
-        *length = fread(text, 1, HM2_MODBUS_FILE_BYTES + 1u, file);
-    if (!text || ferror(file)) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "modbus_io: %s: cannot be read: %s\n", path, strerror(errno));
-        free(text);
-        text = NULL;
-    }
-    if (file)
-        (void)fclose(file);
-    return text;
-}
-
-static int read_map(struct instance *const instance, const char *const path, struct hm2_diag *const diag)
-{
-    size_t length;
-    char *const text = read_file(path, &length);
-    if (!text)
-        return -EINVAL;
-    const int err = hm2_modbus_parse(text, length, path, &instance->map, diag);
-    free(text);
-    return err ? -EINVAL : 0;
-}
-
-static int make(struct instance *const instance, struct hm2_diag *const diag)
+static int export(const struct instance *const instance)
 {
     char name[HAL_NAME_LEN + 1];
-    instance->engine = engine_new(instance->map);
-    if (!instance->engine) {
-        (void)hm2_diag_add(diag, HM2_ERR_NOMEM, "no memory, or a setting that the serial port cannot have");
-        return -ENOMEM;
-    }
-    instance->pins = pins_new(&hal.binder, instance->map, instance->engine, diag);
-    if (!instance->pins)
-        return -EINVAL;
     rtapi_snprintf(name, sizeof name, "%s.update", instance->map->component);
     const int result = hal_export_funct(name, update, instance->pins, 1, 0, component_id);
     return result ? result : engine_start(instance->engine);
@@ -91,23 +47,17 @@ static int make(struct instance *const instance, struct hm2_diag *const diag)
 static int load(const char *const path)
 {
     struct instance *const instance = &instances[count++];
-    struct hm2_diag diag;
-    *instance = (struct instance){0};
-    hm2_diag_clear(&diag);
-    int result = read_map(instance, path, &diag);
+    int result = instance_read(instance, path);
     if (!result)
-        result = make(instance, &diag);
-    messenger_print_diag("modbus_io", path, &diag);
-    return result;
+        result = instance_make(instance, path, &hal.binder);
+    return result ? result : export(instance);
 }
 
 static void unload(void)
 {
-    hal_exit(component_id); /* first, so that no cycle uses what is freed */
-    for (unsigned i = 0; i < count; i++) {
-        engine_free(instances[i].engine);
-        hm2_modbus_free(instances[i].map);
-    }
+    hal_exit(component_id);
+    for (unsigned i = 0; i < count; i++)
+        instance_free(&instances[i]);
     count = 0;
 }
 

@@ -8,11 +8,12 @@
 #include <string.h>
 #include <unistd.h>
 
-#define ANSWER_MS  30000
-#define END_MS     30000
-#define WAIT_STEPS 2000u
-#define STEP_US    10000
-#define MAX_ARGS   24
+#define ANSWER_MS   30000
+#define END_MS      30000
+#define WAIT_STEPS  2000u
+#define STEP_US     10000
+#define MAX_ARGS    24
+#define SHOWN_BYTES 2000u /* of what was said, in a failure; Check takes no more than some kilobytes */
 
 void talk_start(struct talk *const talk, const char *const *options)
 {
@@ -31,7 +32,7 @@ void talk_end(struct talk *const talk)
     if (!process_wait_end(&talk->host, END_MS))
         ck_abort_msg("hm2host does not end: %s", talk->host.text);
     if (talk->host.status != 0)
-        ck_abort_msg("hm2host ended with %d: %s", talk->host.status, talk->host.text);
+        ck_abort_msg("hm2host ended with %d: %.4000s", talk->host.status, talk->host.text);
     (void)process_stop(&talk->host, 0, 0);
 }
 
@@ -103,7 +104,9 @@ void talk_wait(struct talk *const talk, const char *const name, const double low
             return;
         usleep(STEP_US);
     }
-    ck_abort_msg("%s stays at %g instead of %g to %g: %s", name, value, low, high, talk->host.text);
+    const size_t shown = talk->host.len < SHOWN_BYTES ? talk->host.len : SHOWN_BYTES;
+    ck_abort_msg("%s stays at %g instead of %g to %g: ...%s", name, value, low, high,
+                 talk->host.text + talk->host.len - shown);
 }
 
 void talk_wait_text(struct talk *const talk, const char *const text)
