@@ -57,6 +57,7 @@ SYSTEM_TESTS := $(sort $(patsubst tests/system/%.c,%,$(wildcard tests/system/che
 FUZZERS := $(sort $(patsubst tests/fuzz/%.c,%,$(wildcard tests/fuzz/fuzz_*.c)))
 BENCHES := $(sort $(patsubst tests/bench/%.c,%,$(wildcard tests/bench/bench_*.c)))
 UNIT_HELPERS := $(sort $(filter-out tests/unit/test_%.c,$(wildcard tests/unit/*.c)))
+BENCH_HELPERS := $(sort $(filter-out tests/bench/bench_%.c,$(wildcard tests/bench/*.c)))
 SYSTEM_HELPERS := $(sort $(filter-out tests/system/check_%.c,$(wildcard tests/system/*.c)))
 ALL_SRC := $(LIB_SRC) $(SIM_SRC) $(HOST_SRC) $(sort $(wildcard tools/*/*.c components/*/*.c tests/*/*.c))
 MAN_PAGES = $(sort $(wildcard man/*.[0-9])) $(BUILDDIR)/man/hm2_lbp16.9
@@ -272,7 +273,7 @@ $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPE
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) $(SIM_A) -Wl,--whole-archive $(HOST_A) \
 		-Wl,--no-whole-archive $(LIB_A) $(CHECK_LIBS) -rdynamic -lm -lpthread -ldl
 
-$(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(HOST_A) $(SIM_A) $(LIB_A)
+$(BUILDDIR)/bench/%: $(BUILDDIR)/obj/tests/bench/%.o $(call obj,$(BENCH_HELPERS)) $(HOST_A) $(SIM_A) $(LIB_A)
 	@mkdir -p $(@D)
 	$(call say,LD,$@)$(CC) $(ALL_CFLAGS) $(LDFLAGS) -o $@ $(filter %.o,$^) -Wl,--whole-archive $(HOST_A) \
 		-Wl,--no-whole-archive $(SIM_A) $(LIB_A) -rdynamic -lm -lpthread -ldl

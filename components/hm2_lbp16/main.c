@@ -53,7 +53,9 @@ RTAPI_MP_ARRAY_STRING(config, MAX_CARDS, "configuration of each card, see hm2_lb
 static int debug = 0;
 RTAPI_MP_INT(debug, "1 = print the pin listing and packet sizes at load");
 static int busy_poll = 0;
-RTAPI_MP_INT(busy_poll, "SO_BUSY_POLL of the sockets in microseconds; 0 = off");
+RTAPI_MP_INT(busy_poll, "SO_BUSY_POLL of the sockets in microseconds, up to 1000000; 0 = off");
+static char *receive = 0;
+RTAPI_MP_STRING(receive, "wait (default) sleeps until the reply is there, spin asks for it again and again");
 
 static char *flight_folder = 0;
 RTAPI_MP_STRING(flight_folder, "record the times of the last cycles and write them here when one is lost or slow");
@@ -80,8 +82,9 @@ RTAPI_MP_INT(use_serial_numbers, "name smart-serial remotes by unit number");
 static int sserial_baudrate = -1;
 RTAPI_MP_INT(sserial_baudrate, "force the smart-serial baud rate; -1 = as the firmware has it");
 
-#define NO_THREAD (-1)
-#define NS_PER_US 1000
+#define NO_THREAD        (-1)
+#define MAX_BUSY_POLL_US 1000000
+#define NS_PER_US        1000
 
 struct card {
     struct hm2_board *board;
@@ -322,11 +325,16 @@ static int complete_config(char text[const CONFIG_SIZE], const char *const confi
                                             len, CONFIG_SIZE - 1);
 }
 
+static bool spins(void)
+{
+    return receive && strcmp(receive, "spin") == 0;
+}
+
 static int bring_up(struct card *const card, const char *const address, const char *const configuration,
                     struct hm2_diag *const diag)
 {
     const struct link_udp_options options = {
-        .address = address, .busy_poll_us = busy_poll > 0 ? (unsigned)busy_poll : 0, .watch_strangers = true};
+        .address = address, .busy_poll_us = (unsigned)busy_poll, .spin = spins(), .watch_strangers = true};
     char config_text[CONFIG_SIZE];
     struct link *link;
     int err = complete_config(config_text, configuration, diag);
@@ -416,6 +424,21 @@ static bool is_one_of(const char *const text, const char *const *const words)
     return false;
 }
 
+static int check_receive_path(void)
+{
+    static const char *const ways[] = {"wait", "spin", "", NULL};
+    if (receive && !is_one_of(receive, ways)) {
+        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: receive=%s: expected wait or spin\n", receive);
+        return -EINVAL;
+    }
+    if (busy_poll < 0 || busy_poll > MAX_BUSY_POLL_US) {
+        rtapi_print_msg(RTAPI_MSG_ERR, "hm2_lbp16: busy_poll=%d: expected 0 to %d microseconds\n", busy_poll,
+                        MAX_BUSY_POLL_US);
+        return -EINVAL;
+    }
+    return 0;
+}
+
 static void tell_no_effect(const char *const parameter, const char *const value, const char *const why)
 {
     rtapi_print("hm2_lbp16: warning: %s=%s has no effect: %s\n", parameter, value, why);
@@ -476,6 +499,8 @@ static int load_cards(void)
     int result = find_isolation(&mode);
     if (result == 0)
         result = check_lists(given);
+    if (result == 0)
+        result = check_receive_path();
     for (unsigned i = 0; result == 0 && i < given; i++)
         result = load_card(board_ip[i], config[i]);
     if (result == 0)

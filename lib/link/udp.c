@@ -27,7 +27,7 @@ struct udp {
     int watch_fd; /* of the strangers; -1 = they are not watched */
     int stop_fd;  /* tells the watcher to end */
     pthread_t watcher;
-    int64_t busy_ns; /* receive so long without sleeping before waiting for an interrupt */
+    int64_t busy_ns; /* receive so long without sleeping before waiting for an interrupt; INT64_MAX = never sleep */
 };
 
 static int64_t udp_now(struct link *const link)
@@ -82,8 +82,8 @@ static int64_t busy_end(struct udp *const udp, const int64_t deadline_ns)
 {
     if (udp->busy_ns == 0)
         return INT64_MIN;
-    const int64_t end_ns = udp_now(&udp->base) + udp->busy_ns;
-    return end_ns < deadline_ns ? end_ns : deadline_ns;
+    const int64_t now_ns = udp_now(&udp->base);
+    return deadline_ns <= now_ns || deadline_ns - now_ns <= udp->busy_ns ? deadline_ns : now_ns + udp->busy_ns;
 }
 
 enum got { GOT_ONE, GOT_NOTHING, GOT_ERROR };
@@ -283,6 +283,17 @@ static void drop_early_arrivals(struct udp *const udp)
         udp->base.counters.strangers++;
 }
 
+static void poll_busily(struct udp *const udp, const struct link_udp_options *const options,
+                        struct hm2_diag *const diag)
+{
+    const int busy_us = options->busy_poll_us < 1000000u ? (int)options->busy_poll_us : 1000000;
+    udp->busy_ns = options->spin ? INT64_MAX : busy_us * INT64_C(1000);
+    if (busy_us > 0 && setsockopt(udp->fd, SOL_SOCKET, SO_BUSY_POLL, &busy_us, sizeof busy_us) != 0)
+        hm2_diag_warn(diag,
+                      "Busy polling of %d us was refused: %s. Packets are polled for, but the network card is not.",
+                      busy_us, strerror(errno));
+}
+
 static int connect_to(struct udp *const udp, const struct link_udp_options *const options, struct hm2_diag *const diag)
 {
     struct sockaddr_in address;
@@ -300,15 +311,7 @@ static int connect_to(struct udp *const udp, const struct link_udp_options *cons
                             "Card address %s: %s. Check that an interface of this computer is up in the same network.",
                             options->address, strerror(errno));
     drop_early_arrivals(udp);
-    if (options->busy_poll_us > 0) {
-        const int busy_us = options->busy_poll_us < 1000000u ? (int)options->busy_poll_us : 1000000;
-        udp->busy_ns = busy_us * INT64_C(1000);
-        if (setsockopt(udp->fd, SOL_SOCKET, SO_BUSY_POLL, &busy_us, sizeof busy_us) != 0)
-            hm2_diag_warn(diag,
-                          "Busy polling of %d us was refused: %s. Packets are polled for, but the network card "
-                          "is not.",
-                          busy_us, strerror(errno));
-    }
+    poll_busily(udp, options, diag);
     return 0;
 }
 

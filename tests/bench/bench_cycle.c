@@ -13,10 +13,8 @@
  * our own around them. Instructions are counted by single-stepping that thread from another process: exact, and without
  * the kernel's share. `echo` exchanges packets of the same sizes with `serve`, with nothing but the system calls.
  */
-#include <arpa/inet.h>
 #include <errno.h>
 #include <poll.h>
-#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,59 +24,17 @@
 #include <sys/socket.h>
 #include <sys/user.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "halhost.h"
 #include "session.h"
 #include "state.h"
 #include "table.h"
+#include "timing.h"
 
-#define PERIOD_NS  1000000L
-#define WARM_UP    600 /* until pipelined cycles have begun */
-#define MAX_CARDS  16
-#define CLIENT_CPU 1
-#define SERVER_CPU 0
-
-static int64_t now_ns(void)
-{
-    struct timespec ts;
-    clock_gettime(CLOCK_MONOTONIC, &ts);
-    return (int64_t)ts.tv_sec * 1000000000 + ts.tv_nsec;
-}
-
-static void sleep_until(const int64_t when_ns)
-{
-    const struct timespec ts = {.tv_sec = when_ns / 1000000000, .tv_nsec = when_ns % 1000000000};
-    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &ts, NULL);
-}
-
-/* As a servo thread would run; measurements on a machine that does not permit it are still ratios. */
-static void take_processor(const int cpu)
-{
-    const struct sched_param fifo = {.sched_priority = 50};
-    cpu_set_t set;
-    CPU_ZERO(&set);
-    CPU_SET((size_t)cpu, &set);
-    (void)sched_setaffinity(0, sizeof set, &set);
-    (void)sched_setscheduler(0, SCHED_FIFO, &fifo);
-    (void)mlockall(MCL_CURRENT | MCL_FUTURE);
-}
+#define MAX_CARDS 16
 
 /* ---- results ----------------------------------------------------------------------------------------------------- */
-
-static int compare(const void *const a, const void *const b)
-{
-    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
-    return (x > y) - (x < y);
-}
-
-static void print_times(const char *const name, int64_t *const ns, const int count)
-{
-    qsort(ns, (size_t)count, sizeof *ns, compare);
-    printf("%s_median_ns=%lld\n%s_p99_ns=%lld\n", name, (long long)ns[count / 2], name,
-           (long long)ns[(int)(count * 0.99)]);
-}
 
 static void print_cycle_times(int64_t *const read_ns, int64_t *const write_ns, const int cycles)
 {
@@ -124,8 +80,8 @@ struct shared {
 };
 
 static struct shared *shared;
-static int64_t mark_ns[3];
-static int64_t *read_times, *write_times;
+static int64_t mark_ns[3], mark_thread_ns;
+static int64_t *read_times, *write_times, *read_thread_times;
 static int wanted_cycles, seen_cycles;
 static hal_u32_t **errors; /* of each card */
 static unsigned cards = 1;
@@ -135,6 +91,7 @@ static void mark_begin(void *const arg, const long period)
     (void)arg;
     (void)period;
     shared->thread = (int)gettid();
+    mark_thread_ns = thread_ns();
     mark_ns[0] = now_ns();
 }
 
@@ -143,17 +100,20 @@ static void mark_middle(void *const arg, const long period)
     (void)arg;
     (void)period;
     mark_ns[1] = now_ns();
+    mark_thread_ns = thread_ns() - mark_thread_ns;
+    mark_ns[2] = now_ns();
 }
 
 static void mark_end(void *const arg, const long period)
 {
     (void)arg;
     (void)period;
-    mark_ns[2] = now_ns();
+    const int64_t end_ns = now_ns();
     const int at = seen_cycles++ - WARM_UP;
     if (at >= 0 && at < wanted_cycles) {
         read_times[at] = mark_ns[1] - mark_ns[0];
-        write_times[at] = mark_ns[2] - mark_ns[1];
+        read_thread_times[at] = mark_thread_ns;
+        write_times[at] = end_ns - mark_ns[2];
     }
     unsigned sum = 0;
     for (unsigned i = 0; i < cards; i++)
@@ -328,7 +288,8 @@ static int measure_time(const int cycles, char **const argv, const int count)
     wanted_cycles = cycles;
     read_times = calloc((size_t)cycles, sizeof *read_times);
     write_times = calloc((size_t)cycles, sizeof *write_times);
-    if (!read_times || !write_times)
+    read_thread_times = calloc((size_t)cycles, sizeof *read_thread_times);
+    if (!read_times || !write_times || !read_thread_times)
         return 1;
     start_driver(argv[0], argv[1], argv[3], argv + 4, count - 4);
     wait_for_cycles(cycles + WARM_UP);
@@ -338,6 +299,7 @@ static int measure_time(const int cycles, char **const argv, const int count)
         return 1;
     }
     print_cycle_times(read_times, write_times, cycles);
+    print_times("read_thread", read_thread_times, cycles);
     return 0;
 }
 
@@ -415,16 +377,6 @@ static int measure_instructions(const int cycles, char **const argv, const int c
 }
 
 /* ---- bare echo --------------------------------------------------------------------------------------------------- */
-
-static struct sockaddr_in address_of(const char *const address, const char *const port)
-{
-    struct sockaddr_in in = {.sin_family = AF_INET, .sin_port = htons((uint16_t)strtoul(port, NULL, 10))};
-    if (inet_pton(AF_INET, address, &in.sin_addr) != 1) {
-        fprintf(stderr, "bench_cycle: %s is no IPv4 address\n", address);
-        exit(2);
-    }
-    return in;
-}
 
 static int serve(char **const argv)
 {

@@ -346,6 +346,28 @@ START_TEST(a_bad_address_is_refused_with_a_sentence)
 }
 END_TEST
 
+static const struct {
+    const char *parameter;
+    const char *sentences[2];
+} bad_receive_paths[] = {
+    {"receive=xdp", {"receive=xdp: expected wait or spin"}},
+    {"receive=spinning", {"receive=spinning: expected wait or spin"}},
+    {"busy_poll=-1", {"busy_poll=-1: expected 0 to 1000000 microseconds"}},
+    {"busy_poll=1000001", {"busy_poll=1000001: expected 0 to 1000000 microseconds"}},
+};
+
+START_TEST(a_receive_path_that_does_not_exist_is_refused)
+{
+    char line[512];
+    talk_start(&hal, NULL);
+    for (int i = 0; i < COUNT(bad_receive_paths); i++) {
+        snprintf(line, sizeof line, "loadrt hm2_lbp16 board_ip=127.0.0.9 %s", bad_receive_paths[i].parameter);
+        expect_refusal(line, bad_receive_paths[i].sentences);
+    }
+    talk_end(&hal);
+}
+END_TEST
+
 START_TEST(a_card_that_is_not_there_is_said_to_be_not_there)
 {
     char line[512], nobody[16];
@@ -766,6 +788,7 @@ int main(void)
     tcase_add_test(tests, load_lines_of_linuxcnc_are_accepted);
     tcase_add_test(tests, a_bad_configuration_is_refused_with_the_key_the_value_and_the_limit);
     tcase_add_test(tests, a_bad_address_is_refused_with_a_sentence);
+    tcase_add_test(tests, a_receive_path_that_does_not_exist_is_refused);
     tcase_add_test(tests, a_card_that_is_not_there_is_said_to_be_not_there);
     tcase_add_test(tests, a_card_that_says_nothing_for_half_a_second_is_loaded_all_the_same);
     tcase_add_test(tests, when_the_second_card_is_missing_the_first_ones_watchdog_is_bitten);

@@ -32,9 +32,19 @@ static void peer_open(struct peer *const peer)
     (void)snprintf(peer->address, sizeof peer->address, "127.0.0.1:%u", ntohs(peer->at.sin_port));
 }
 
+/* Ways to receive. All tests run with each of them. */
+static const struct way {
+    const char *name;
+    unsigned busy_poll_us;
+    bool spin;
+} ways[] = {{"wait", 0, false}, {"busy poll", 50, false}, {"spin", 0, true}, {"busy poll and spin", 50, true}};
+
+static const struct way *way = &ways[0];
+
 static struct link *open_link(const struct peer *const peer, const bool watch)
 {
-    const struct link_udp_options options = {.address = peer->address, .watch_strangers = watch};
+    const struct link_udp_options options = {
+        .address = peer->address, .busy_poll_us = way->busy_poll_us, .spin = way->spin, .watch_strangers = watch};
     struct hm2_diag diag = {0};
     struct link *link = NULL;
     if (link_udp_open(&link, &options, &diag) != 0)
@@ -331,5 +341,10 @@ int main(void)
         cmocka_unit_test(two_links_of_one_host_do_not_hear_each_other),
         cmocka_unit_test(an_address_is_parsed_strictly),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    int failed = 0;
+    for (way = ways; way < ways + sizeof ways / sizeof ways[0]; way++) {
+        print_message("receive: %s\n", way->name);
+        failed += cmocka_run_group_tests(tests, NULL, NULL);
+    }
+    return failed;
 }

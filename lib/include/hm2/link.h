@@ -91,14 +91,15 @@ static inline uint64_t link_strangers(const struct link *const link)
 struct link_udp_options {
     const char *address;   /* dotted IPv4 of the card, optionally ":port" (default LBP16's 27181) */
     unsigned busy_poll_us; /* try so long without sleeping, with SO_BUSY_POLL (refused = a warning); 0 = off */
+    bool spin;             /* try until the deadline without sleeping; a processor does nothing else meanwhile */
     bool watch_strangers;  /* count datagrams from others, in a thread that never touches the cyclic socket */
 };
 
 /* Open a connected socket: packets of strangers never reach recv(). Not realtime safe. On failure diag says why.
  *
  * Clock: CLOCK_MONOTONIC. System calls: send() is one send(2); recv() is one ppoll(2) and one recv(2) for a datagram
- * that comes in time, one recv(2) alone when the deadline is over already. While it polls busily, recv() calls recv(2)
- * again and again instead.
+ * that comes in time, one recv(2) alone when the deadline is over already. While it polls busily or spins, recv()
+ * calls recv(2) again and again instead.
  *
  * That nobody listens at the card's address (ICMP errors, no route) is not an error of the link: the datagram counts
  * as lost and in send_errors or receive_errors, send() returns 0 and recv() goes on waiting; the card may come back.
