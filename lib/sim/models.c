@@ -10,6 +10,7 @@ extern const struct sim_module_ops sim_fabs_ops;
 extern const struct sim_module_ops sim_hm2dpll_ops;
 extern const struct sim_module_ops sim_inm_ops;
 extern const struct sim_module_ops sim_inmux_ops;
+extern const struct sim_module_ops sim_oneshot_ops;
 extern const struct sim_module_ops sim_outm_ops;
 extern const struct sim_module_ops sim_spi_ops;
 extern const struct sim_module_ops sim_ssr_ops;
@@ -67,6 +68,7 @@ const struct sim_module_ops *const sim_models[] = {
     &sim_rcpwm_ops,         /* 2C */
     &sim_periodm_ops,       /* C8 */
     &sim_resolver_ops,      /* C0 */
+    &sim_oneshot_ops,       /* C7 */
     &sim_xy2mod_ops,        /* 2B */
     NULL,
 };

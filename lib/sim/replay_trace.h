@@ -89,6 +89,9 @@ struct replay_kind {
     const struct replay_vector *vectors;
     /* Everything outside before a test: pull-ups, inputs at rest. May be NULL. */
     int (*prepare)(struct replay_run *run);
+    /* What registers of the firmware held at the start of a test, and no event tells: prepare() sets one of so many
+     * possibilities, run->start, and one of them must match. 0 is power-up. */
+    unsigned starts;
     /* Stimuli that the recording bench applied without an event of their own. May be NULL. Called with each event
      * before it is played. */
     int (*before_event)(struct replay_run *run, const struct replay_event *event);
@@ -145,6 +148,7 @@ struct replay_run {
     const struct replay_kind *kind;
     const struct replay_trace *trace;
     const struct replay_test *test;
+    unsigned start;
     struct sim_card *card;
     size_t edges_seen;
     int64_t first_edge; /* time from which edges are compared */
@@ -192,6 +196,10 @@ int replay_sslbp_polls(const struct replay_trace *trace, const struct replay_tes
 int replay_spi_prepare(struct replay_run *run);
 void replay_spi_edge(struct replay_run *run, int64_t clk, unsigned watch, enum sim_level level);
 int replay_spi_word(struct replay_run *run, const struct replay_event *event);
+
+/* Waveform generators in the middle of their pulses. */
+#define REPLAY_WAVEGEN_STARTS 128u
+int replay_wavegen_prepare(struct replay_run *run);
 
 /* Bench of the resolver recordings. */
 int replay_resolver_prepare(struct replay_run *run);

@@ -117,4 +117,8 @@ int64_t sim_stepgen_position(struct sim_card *card, unsigned stepgen);
  * at this position can tell, drove its pin: seconds at full duty * 2^32. */
 int64_t sim_pwmgen_position(struct sim_card *card, unsigned pwmgen);
 
+/* Puts a waveform generator into the middle of its pulses: value in all of its table, the part of a pulse that it has
+ * collected, in 1/4096, and edges of ClockHigh up to its next step. For recordings that begin there. */
+void sim_wavegen_start(struct sim_card *card, unsigned wavegen, uint16_t value, uint16_t density, uint8_t edges);
+
 #endif

@@ -201,6 +201,21 @@ static void trace(struct sim_module *const m, const unsigned unit, const uint8_t
     }
 }
 
+void sim_wavegen_start(struct sim_card *const card, const unsigned wavegen, const uint16_t value,
+                       const uint16_t density, const uint8_t edges)
+{
+    struct sim_module *const m = sim_find(card, HM2_GTAG_WAVEGEN);
+    struct wavegen *const s = m ? m->state : NULL;
+    if (!s || wavegen >= s->count)
+        return;
+    struct channel *const c = &s->channels[wavegen];
+    for (unsigned i = 0; i < TABLE_WORDS; i++)
+        c->table[i] = value;
+    c->word = value;
+    c->accum_density = density & DENSITY_MASK;
+    c->count = edges;
+}
+
 const struct sim_module_ops sim_wavegen_ops = {
     .gtag = HM2_GTAG_WAVEGEN,
     .name = "WaveGen",

@@ -10,7 +10,7 @@ static void every_recorded_read_and_edge_is_matched(void **state)
     (void)state;
     const struct replay_totals totals = replay_data("wavegen");
     assert_int_equal(totals.failed, 0);
-    assert_int_equal(totals.passed, 6);
+    assert_int_equal(totals.passed, 11);
 }
 
 struct pulses {
