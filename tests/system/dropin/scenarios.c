@@ -426,6 +426,66 @@ static const struct event fanuc_events[] = {
     {900, 1000, ABSOLUTE, HM2_GTAG_FABS, 0, 76, 10000001},
 };
 
+/* ---- three-phase PWM, RC servos and a galvo interface: limits, settings, a fault, enabling and disabling */
+
+static const struct setting drives_settings[] = {
+    {0, "watchdog.timeout_ns", 20000000},
+    {10, "3pwmgen.00.enable", 1},
+    {10, "3pwmgen.01.enable", 1},
+    {50, "3pwmgen.00.scale", 24},
+    {100, "3pwmgen.00.deadtime", 1500},
+    {120, "3pwmgen.00.deadtime", -100},      /* 0 */
+    {140, "3pwmgen.00.deadtime", 100000000}, /* clamped */
+    {160, "3pwmgen.00.deadtime", 2000},
+    {180, "3pwmgen.frequency", 40000},
+    {200, "3pwmgen.frequency", 1000000}, /* clamped */
+    {220, "3pwmgen.frequency", 20000},
+    {240, "3pwmgen.01.sample-time", 0.25},
+    {260, "3pwmgen.01.fault-invert", 1},
+    {300, "3pwmgen.01.fault-invert", 0},
+    {320, "3pwmgen.01.enable", 0},
+    {330, "3pwmgen.01.enable", 1},
+    {400, "3pwmgen.00.enable", 0},
+    {100, "rcpwmgen.01.scale", 2},
+    {150, "rcpwmgen.01.offset", 1.5},
+    {200, "rcpwmgen.rate", 100},
+    {250, "rcpwmgen.rate", 5000}, /* clamped */
+    {300, "rcpwmgen.rate", 333},
+    {350, "rcpwmgen.00.scale", 0}, /* 1 */
+    {20, "xy2mod.00.enable", 1},
+    {20, "xy2mod.00.posx-scale", 100},
+    {20, "xy2mod.00.posy-scale", -50},
+    {200, "xy2mod.00.velx-cmd", 20},
+    {220, "xy2mod.00.velx-cmd", -20},
+    {240, "xy2mod.00.velx-cmd", 0},
+    {300, "xy2mod.00.accy-cmd", 1000},
+    {320, "xy2mod.00.accy-cmd", -1000},
+    {340, "xy2mod.00.accy-cmd", 0},
+    {400, "xy2mod.00.18bitmodex", 1},
+    {420, "xy2mod.00.controlx", 9}, /* 1 */
+    {440, "xy2mod.00.commandmodey", 1},
+    {440, "xy2mod.00.commandy", 0x12345}, /* 0x2345 */
+    {500, "xy2mod.00.enable", 0},
+    {520, "xy2mod.00.enable", 1},
+};
+
+static const struct wave drives_waves[] = {
+    {"3pwmgen.00.A-value", WAVE_SINE, 1, 0, 100, 0, 600},
+    {"3pwmgen.00.B-value", WAVE_SINE, 0.9, 0, 130, 0, 600},
+    {"3pwmgen.00.C-value", WAVE_TRIANGLE, 0.99, 0, 70, 0, 600},
+    {"3pwmgen.01.A-value", WAVE_SQUARE, 2, 0, 40, 0, 600},
+    {"3pwmgen.01.B-value", WAVE_RAMP, 0.5, 0.1, 90, 0, 600},
+    {"rcpwmgen.00.width", WAVE_TRIANGLE, 0.5, 1.5, 200, 0, 340},
+    {"rcpwmgen.01.width", WAVE_SINE, 1, 0.5, 300, 0, 600},
+    {"xy2mod.00.posx-cmd", WAVE_SINE, 90, 0, 120, 0, 180},
+    {"xy2mod.00.posy-cmd", WAVE_TRIANGLE, 40, 0, 90, 0, 280},
+};
+
+static const struct event drives_events[] = {
+    {340, 0, FAULT, 0, 1, 0, 0},
+    {360, 0, FAULT, 0, 0, 0, 0},
+};
+
 /* ---- the same for a card with nothing but ports, whose pads are driven, too */
 
 static const struct setting ports_settings[] = {
@@ -508,6 +568,8 @@ const struct scenario scenarios[] = {
     SCENARIO(fanuc, "7i93", "fanuc_chan_0=AA64 fanuc_chan_1=low%16umiddle%32shigh%28u", 1000,
              .firmware = TEST_DATA "/firmware/absolute_48.hex", .sources = SIM_SOURCES_2021, .from = LOCKED,
              .reached = {{"fanuc.00.crc", 0.5}, {"fanuc.00.encoder.count", 1000}, {"fanuc.01.low", 65000}}),
+    SCENARIO(drives, "7i93", "num_resolvers=0 num_oneshots=0", 600, .firmware = TEST_DATA "/firmware/drives_29_48.hex",
+             .reached = {{"3pwmgen.00.fault", 1}, {"xy2mod.00.posx-fb", 0.009}}),
     SCENARIO(paced, "7i96s", "", 2000, .paced = true, .reached = {{"encoder.00.count", 15000}}),
 };
 const size_t scenario_count = COUNT(scenarios);
