@@ -75,7 +75,7 @@ static void start_word(struct sim_7i65 *const s, const int64_t clk)
 static void turn(struct sim_7i65 *const s, const int64_t clk)
 {
     for (unsigned i = 0; i < SIM_7I65_CHANNELS; i++) {
-        const bool enabled = s->enables >> i & 1u;
+        const bool enabled = (unsigned)s->enables >> i & 1u;
         if (s->driven[i])
             sim_motor_turn(&s->motor[i], enabled ? s->out_volts[i] / VOLTS : 0.0, clk, sim_clock_low_hz(s->card));
     }

@@ -81,6 +81,7 @@ static void run_driver(const struct scenario *const scenario, const enum driver_
                       .record = record};
     run.driver.paced = scenario->paced;
     run.driver.firmware = scenario->firmware;
+    run.driver.sources = scenario->sources;
     run.driver.has_7i65 = scenario->has_7i65;
     run.driver.on_write = on_write;
     run.driver.context = &run;

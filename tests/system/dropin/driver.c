@@ -203,7 +203,7 @@ static void read_firmware(const char *const path, struct hm2_image *const image)
 static void open_card(struct driver *const driver, const char *const card)
 {
     struct hm2_image image;
-    struct sim_card_options options = {.profile = card, .seed = 1};
+    struct sim_card_options options = {.profile = card, .seed = 1, .sources = driver->sources};
     struct hm2_diag diag = {0};
     if (driver->firmware) {
         read_firmware(driver->firmware, &image);

@@ -13,6 +13,7 @@
 
 enum { PIN_A = 0x01, PIN_B = 0x02, PIN_INDEX = 0x03 }; /* of encoders (register map 4.1) */
 #define BEHIND_MULTIPLEXER 0x40u                       /* of one encoder of a pair, see lib/sim/sim_muxed_encoder.c */
+#define PIN_FAULT          0x08u                       /* of three-phase PWM generators */
 #define EDGE_NS            5000
 
 static void set_point(const struct driver *const driver, const char *const name, const double value)
@@ -116,6 +117,8 @@ static void set_everything(const struct scenario *const scenario, const struct d
 
 bool scenario_compares(const struct scenario *const scenario, const unsigned cycle)
 {
+    if (cycle < scenario->from)
+        return false;
     return scenario->settle == 0 || cycle % scenario->settle == scenario->settle - 1u;
 }
 
@@ -143,6 +146,18 @@ static void turn(const struct driver *const driver, const struct event *const ev
         drive_encoder(driver, at, event->a, PIN_A, place == 1 || place == 2);
         drive_encoder(driver, at, event->a, PIN_B, place >= 2);
     }
+}
+
+/* The bits above the first 64 differ from cycle to cycle, too. */
+static void show_absolute(const struct driver *const driver, const struct event *const event)
+{
+    const uint64_t place = (uint64_t)((int64_t)(driver->cycle - event->cycle) * event->d);
+    const uint64_t code = event->action == ABSOLUTE_GRAY ? place ^ place >> 1 : place;
+    const struct sim_absolute encoder = {
+        .bits = (unsigned)event->c,
+        .value = {(uint32_t)code, (uint32_t)(code >> 32), (uint32_t)(driver->cycle * 0x9E3779B9u), driver->cycle},
+        .processing = 2};
+    ck_assert_int_eq(sim_card_absolute(driver->card, (uint8_t)event->a, (unsigned)event->b, &encoder), 0);
 }
 
 /* What happens to card and network while an event lasts; true when write() is left out. */
@@ -173,6 +188,15 @@ static bool apply_event(const struct event *const event, struct driver *const dr
         break;
     case SERVO_INPUTS:
         sim_7i65_set_inputs(driver->servo, (uint8_t)event->a);
+        break;
+    case ABSOLUTE:
+    case ABSOLUTE_GRAY:
+        show_absolute(driver, event);
+        break;
+    case FAULT:
+        ck_assert_int_eq(sim_card_drive_input(driver->card, clk, HM2_GTAG_TPPWM, (unsigned)event->a, PIN_FAULT,
+                                              event->b ? SIM_HIGH : SIM_LOW),
+                         0);
         break;
     case POWER_CYCLE:
         sim_card_power_cycle(driver->card);

@@ -36,6 +36,9 @@ enum action {
     NO_WRITE,      /* write() is not called in [cycle, to) */
     SERVO_VOLTS,   /* b millivolts at analog input a of the 7I65 */
     SERVO_INPUTS,  /* levels of the 7I65's digital inputs: a */
+    ABSOLUTE, /* in [cycle, to): an absolute encoder of c bits, turning d counts a cycle, at channel b of module a */
+    ABSOLUTE_GRAY, /* the same in Gray code */
+    FAULT,         /* fault input of three-phase PWM generator a is at level b */
     POWER_CYCLE,   /* of the card, in this cycle */
 };
 
@@ -66,6 +69,8 @@ struct scenario {
     const char *const *keeps;                 /* shell patterns, ends with NULL */
     bool paced;                               /* the card's processor takes its time */
     const char *firmware;                     /* of the card instead of the usual one, or NULL */
+    enum sim_sources sources;                 /* that the card's firmware is made from */
+    unsigned from;                            /* nothing is compared before this cycle */
     bool has_7i65;                            /* at the card's first buffered SPI port */
     struct milestone reached[MAX_MILESTONES]; /* ends with a point NULL, or when full */
 };

@@ -2,6 +2,10 @@
 /* The scripts of tests/system/check_dropin_behaviour.c. */
 #include "scenario.h"
 
+#include <hm2/idrom.h>
+
+#define LOCKED 250 /* cycle in which the DPLL has found its phase, whatever the load took */
+
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
 #define SCENARIO(script, on, with, length, ...)                                                                  \
     {                                                                                                            \
@@ -359,6 +363,129 @@ static const struct event octal_events[] = {
     {200, 1000, TURN, 15, 1, 0, 0},
 };
 
+/* ---- absolute encoders, started by DPLL timers, as LinuxCNC's other start is a function of its own. A high part
+ * before its low part ends the process with LinuxCNC's driver. */
+
+static const struct setting absolute_settings[] = {
+    {0, "watchdog.timeout_ns", 20000000},
+    {0, "dpll.01.timer-us", -300},
+    {0, "dpll.02.timer-us", -400},
+    {0, "dpll.04.timer-us", -200},
+    {0, "ssi.00.timer-number", 1},
+    {0, "ssi.01.timer-number", 2},
+    {0, "biss.01.timer-number", 1},
+    {200, "ssi.01.pos.scale", 400},
+    {300, "ssi.00.frequency-khz", 1000},
+    {350, "ssi.00.a-scalemax", 10},
+    {350, "ssi.00.d-scalemax", 3},
+    {400, "ssi.01.pos.counts-per-rev", 1000},
+    {450, "biss.01.frequency-khz", 1000},
+    {460, "biss.01.turns.scale", -50},
+    {500, "ssi.00.timer-number", 9}, /* clamped */
+    {550, "ssi.00.timer-number", 1},
+    {600, "ssi.01.frequency-khz", 250},
+    {650, "ssi.01.pos.reset", 1},
+    {660, "ssi.01.pos.reset", 0},
+    {700, "biss.01.turns.reset", 1},
+    {701, "biss.01.turns.reset", 0},
+    {750, "biss.01.turns.counts-per-rev", 10000},
+    {760, "biss.01.turns.index-enable", 1},
+    {1150, "ssi.01.pos.index-enable", 1},
+};
+
+static const struct wave absolute_waves[] = {
+    {"led.CR03", WAVE_SQUARE, 0.5, 0.5, 100, 0, 1200},
+};
+
+static const struct event absolute_events[] = {
+    {0, 800, ABSOLUTE, HM2_GTAG_SSI, 0, 30, 1234567},  {0, 1200, ABSOLUTE_GRAY, HM2_GTAG_SSI, 1, 25, -37},
+    {0, 1100, ABSOLUTE, HM2_GTAG_BISS, 1, 30, 4321},   {800, 0, ABSOLUTE, HM2_GTAG_SSI, 0, 0, 0},
+    {900, 1200, ABSOLUTE, HM2_GTAG_SSI, 0, 30, 77777}, {1100, 0, ABSOLUTE, HM2_GTAG_BISS, 1, 0, 0},
+};
+
+/* ---- the same for Fanuc. LinuxCNC's driver writes the control word over length and rate, which the sources of 2021
+ * ignore; those would not start its BISS by a timer. */
+
+static const struct setting fanuc_settings[] = {
+    {0, "watchdog.timeout_ns", 20000000},    {0, "dpll.01.timer-us", -300},
+    {0, "dpll.02.timer-us", -400},           {0, "fanuc.00.timer-number", 1},
+    {0, "fanuc.01.timer-number", 1},         {400, "fanuc.00.timer-number", 2},
+    {500, "fanuc.00.encoder.scale", 65536},  {600, "fanuc.01.low-scalemax", 65535},
+    {600, "fanuc.01.middle-scalemax", -100}, {700, "fanuc.00.encoder.reset", 1},
+    {710, "fanuc.00.encoder.reset", 0},      {720, "fanuc.00.encoder.index-enable", 1},
+};
+
+static const struct wave fanuc_waves[] = {
+    {"led.CR03", WAVE_SQUARE, 0.5, 0.5, 100, 0, 1000},
+};
+
+static const struct event fanuc_events[] = {
+    {0, 800, ABSOLUTE, HM2_GTAG_FABS, 0, 76, 10000001},
+    {0, 1000, ABSOLUTE, HM2_GTAG_FABS, 1, 76, 1000001},
+    {800, 0, ABSOLUTE, HM2_GTAG_FABS, 0, 0, 0},
+    {900, 1000, ABSOLUTE, HM2_GTAG_FABS, 0, 76, 10000001},
+};
+
+/* ---- three-phase PWM, RC servos and a galvo interface: limits, settings, a fault, enabling and disabling */
+
+static const struct setting drives_settings[] = {
+    {0, "watchdog.timeout_ns", 20000000},
+    {10, "3pwmgen.00.enable", 1},
+    {10, "3pwmgen.01.enable", 1},
+    {50, "3pwmgen.00.scale", 24},
+    {100, "3pwmgen.00.deadtime", 1500},
+    {120, "3pwmgen.00.deadtime", -100},      /* 0 */
+    {140, "3pwmgen.00.deadtime", 100000000}, /* clamped */
+    {160, "3pwmgen.00.deadtime", 2000},
+    {180, "3pwmgen.frequency", 40000},
+    {200, "3pwmgen.frequency", 1000000}, /* clamped */
+    {220, "3pwmgen.frequency", 20000},
+    {240, "3pwmgen.01.sample-time", 0.25},
+    {260, "3pwmgen.01.fault-invert", 1},
+    {300, "3pwmgen.01.fault-invert", 0},
+    {320, "3pwmgen.01.enable", 0},
+    {330, "3pwmgen.01.enable", 1},
+    {400, "3pwmgen.00.enable", 0},
+    {100, "rcpwmgen.01.scale", 2},
+    {150, "rcpwmgen.01.offset", 1.5},
+    {200, "rcpwmgen.rate", 100},
+    {250, "rcpwmgen.rate", 5000}, /* clamped */
+    {300, "rcpwmgen.rate", 333},
+    {350, "rcpwmgen.00.scale", 0}, /* 1 */
+    {20, "xy2mod.00.enable", 1},
+    {20, "xy2mod.00.posx-scale", 100},
+    {20, "xy2mod.00.posy-scale", -50},
+    {200, "xy2mod.00.velx-cmd", 20},
+    {220, "xy2mod.00.velx-cmd", -20},
+    {240, "xy2mod.00.velx-cmd", 0},
+    {300, "xy2mod.00.accy-cmd", 1000},
+    {320, "xy2mod.00.accy-cmd", -1000},
+    {340, "xy2mod.00.accy-cmd", 0},
+    {400, "xy2mod.00.18bitmodex", 1},
+    {420, "xy2mod.00.controlx", 9}, /* 1 */
+    {440, "xy2mod.00.commandmodey", 1},
+    {440, "xy2mod.00.commandy", 0x12345}, /* 0x2345 */
+    {500, "xy2mod.00.enable", 0},
+    {520, "xy2mod.00.enable", 1},
+};
+
+static const struct wave drives_waves[] = {
+    {"3pwmgen.00.A-value", WAVE_SINE, 1, 0, 100, 0, 600},
+    {"3pwmgen.00.B-value", WAVE_SINE, 0.9, 0, 130, 0, 600},
+    {"3pwmgen.00.C-value", WAVE_TRIANGLE, 0.99, 0, 70, 0, 600},
+    {"3pwmgen.01.A-value", WAVE_SQUARE, 2, 0, 40, 0, 600},
+    {"3pwmgen.01.B-value", WAVE_RAMP, 0.5, 0.1, 90, 0, 600},
+    {"rcpwmgen.00.width", WAVE_TRIANGLE, 0.5, 1.5, 200, 0, 340},
+    {"rcpwmgen.01.width", WAVE_SINE, 1, 0.5, 300, 0, 600},
+    {"xy2mod.00.posx-cmd", WAVE_SINE, 90, 0, 120, 0, 180},
+    {"xy2mod.00.posy-cmd", WAVE_TRIANGLE, 40, 0, 90, 0, 280},
+};
+
+static const struct event drives_events[] = {
+    {340, 0, FAULT, 0, 1, 0, 0},
+    {360, 0, FAULT, 0, 0, 0, 0},
+};
+
 /* ---- the same for a card with nothing but ports, whose pads are driven, too */
 
 static const struct setting ports_settings[] = {
@@ -435,6 +562,14 @@ const struct scenario scenarios[] = {
                          {"7i65.enables", 0x89},
                          {"encoder.00.count", 1900},
                          {"mesa-7i65.0.digital.3.in", 1}}),
+    SCENARIO(absolute, "7i93", "ssi_chan_0=a%12ub%3fc%1b%2pd%12s ssi_chan_1=pos%25ge biss_chan_1=turns%18lturns%12h",
+             1200, .firmware = TEST_DATA "/firmware/absolute_48.hex", .from = LOCKED,
+             .reached = {{"ssi.00.a", 9.9}, {"biss.01.turns.count", 1000000}, {"ssi.01.pos.count", 1}}),
+    SCENARIO(fanuc, "7i93", "fanuc_chan_0=AA64 fanuc_chan_1=low%16umiddle%32shigh%28u", 1000,
+             .firmware = TEST_DATA "/firmware/absolute_48.hex", .sources = SIM_SOURCES_2021, .from = LOCKED,
+             .reached = {{"fanuc.00.crc", 0.5}, {"fanuc.00.encoder.count", 1000}, {"fanuc.01.low", 65000}}),
+    SCENARIO(drives, "7i93", "num_resolvers=0 num_oneshots=0", 600, .firmware = TEST_DATA "/firmware/drives_29_48.hex",
+             .reached = {{"3pwmgen.00.fault", 1}, {"xy2mod.00.posx-fb", 0.009}}),
     SCENARIO(paced, "7i96s", "", 2000, .paced = true, .reached = {{"encoder.00.count", 15000}}),
 };
 const size_t scenario_count = COUNT(scenarios);
