@@ -9,10 +9,11 @@
 
 #include "simulator.h"
 
-#define RUN_MS  30000
-#define TUNED   TEST_DATA "/doctor/tuned"
-#define DESKTOP TEST_DATA "/doctor/desktop"
-#define ROUNDS  2000
+#define RUN_MS     30000
+#define TUNED      TEST_DATA "/doctor/tuned"
+#define DESKTOP    TEST_DATA "/doctor/desktop"
+#define ROUNDS     2000
+#define CANNOT_RUN 77
 
 static struct process run;
 static char folder[] = "/tmp/check-doctor-XXXXXX";
@@ -53,6 +54,7 @@ START_TEST(nothing_is_found_at_a_tuned_computer)
     ck_assert_ptr_null(strstr(run.text, "fault "));
     ck_assert_ptr_null(strstr(run.text, "unknown"));
     expect_line("ok", "route", "reached directly by enp2s0");
+    expect_line("ok", "conflict", "one device has the address 192.168.1.121");
 }
 END_TEST
 
@@ -75,6 +77,8 @@ static const struct {
     {"advice", "queues", "ethtool -L enp3s0 combined 1"},
     {"advice", "sharing", "default route"},
     {"advice", "arp", "52:54:00:aa:bb:cc"},
+    {"fault", "conflict",
+     "2 devices have the address 192.168.1.121, among them 52:54:00:aa:bb:cc and 00:60:1b:16:01:02"},
     {"advice", "rp_filter", "net.ipv4.conf.enp3s0.rp_filter=2"},
     {"advice", "firewall", "27181"},
 };
@@ -95,6 +99,28 @@ START_TEST(a_card_behind_a_gateway_and_one_without_a_way_are_told_apart)
     expect_line("fault", "route", "through a gateway by enp3s0");
     ck_assert_int_eq(DOCTOR("--state", folder, "--card", "10.10.10.10"), 1);
     expect_line("fault", "route", "no way to 10.10.10.10");
+}
+END_TEST
+
+START_TEST(an_address_that_this_computer_has_itself_is_a_conflict)
+{
+    ck_assert_int_eq(DOCTOR("--state", DESKTOP, "--card", "192.168.1.10"), 1);
+    expect_line("fault", "conflict", "192.168.1.10 is an address of this computer, too");
+    ck_assert_int_eq(DOCTOR("--state", DESKTOP, "--card", "192.168.1.255"), 1); /* there as broadcast, not as address */
+    expect_line("unknown", "conflict", "shown to root only");
+}
+END_TEST
+
+START_TEST(devices_that_answer_for_the_cards_address_are_counted)
+{
+    const char *const argv[] = {TEST_SOURCE "/tests/system/conflict-peer", TEST_BUILD, NULL};
+    if (process_run(&run, argv, RUN_MS) == CANNOT_RUN) {
+        printf("%s", run.text);
+        return;
+    }
+    if (!strstr(run.text, "alone: ok one device has") || !strstr(run.text, "two: fault 2 devices have the address") ||
+        !strstr(run.text, "own: fault 192.168.1.1 is an address of this computer"))
+        ck_abort_msg("%s", run.text);
 }
 END_TEST
 
@@ -245,6 +271,8 @@ int main(void)
     tcase_add_test(tests, nothing_is_found_at_a_tuned_computer);
     tcase_add_test(tests, each_fault_of_a_desktop_computer_has_a_line_with_its_remedy);
     tcase_add_test(tests, a_card_behind_a_gateway_and_one_without_a_way_are_told_apart);
+    tcase_add_test(tests, an_address_that_this_computer_has_itself_is_a_conflict);
+    tcase_add_test(tests, devices_that_answer_for_the_cards_address_are_counted);
     tcase_add_test(tests, what_was_kept_is_judged_as_what_was_seen);
     tcase_add_test(tests, wrong_command_lines_are_refused);
     tcase_add_loop_test(tests, each_pattern_of_delays_is_named, 0, (int)(sizeof patterns / sizeof patterns[0]));

@@ -140,6 +140,81 @@ static void check_neighbour(struct patient *const p)
     }
 }
 
+/* This computer itself, as the tree of /proc/net/fib_trie has its own addresses: "|-- ADDRESS", then "/32 host LOCAL".
+ */
+static bool is_own_address(struct patient *const p, const char *const card)
+{
+    static char text[STATE_TEXT_BYTES];
+    if (!state_text(p->state, text, sizeof text, "proc/net/fib_trie"))
+        return false;
+    for (const char *line = text; line; line = next_line(line)) {
+        const char *const below = next_line(line);
+        char address[INET_ADDRSTRLEN];
+        if (below && sscanf(line, " |-- %15s", address) == 1 && strcmp(address, card) == 0 &&
+            strstr(below, "/32 host LOCAL") && strstr(below, "/32 host LOCAL") < below + strcspn(below, "\n"))
+            return true;
+    }
+    return false;
+}
+
+#define DEVICES    4u
+#define MAC_LENGTH 18u /* with the terminating zero */
+
+struct devices {
+    char mac[DEVICES][MAC_LENGTH];
+    unsigned count;
+};
+
+static void note_device(struct devices *const devices, const char *const mac)
+{
+    for (unsigned i = 0; i < devices->count; i++)
+        if (strcmp(devices->mac[i], mac) == 0)
+            return;
+    if (devices->count < DEVICES)
+        snprintf(devices->mac[devices->count++], MAC_LENGTH, "%s", mac);
+}
+
+/* Those that the table has at any port, and those that answered just now. */
+static bool look_for_devices(struct patient *const p, const char *const card, struct devices *const devices)
+{
+    static char text[STATE_TEXT_BYTES];
+    char address[INET_ADDRSTRLEN], flags[8], mac[MAC_LENGTH];
+    if (state_text(p->state, text, sizeof text, "proc/net/arp"))
+        for (const char *line = next_line(text); line; line = next_line(line))
+            if (sscanf(line, "%15s %*s %7s %17s", address, flags, mac) == 3 && strcmp(address, card) == 0 &&
+                strtoul(flags, NULL, 16) != 0)
+                note_device(devices, mac);
+    if (!state_text(p->state, text, sizeof text, "doctor/arp/%s/%s", p->interface, card))
+        return false;
+    for (const char *line = text; line; line = next_line(line))
+        if (sscanf(line, "reply %17s", mac) == 1)
+            note_device(devices, mac);
+    return true;
+}
+
+static void check_conflict(struct patient *const p)
+{
+    struct devices devices = {.count = 0};
+    char card[INET_ADDRSTRLEN];
+    card_text(p->card, card);
+    if (is_own_address(p, card)) {
+        remedy(find(p->findings, "conflict", GRADE_FAULT, "%s is an address of this computer, too", card), false,
+               "ip addr del %s dev INTERFACE (ip addr shows which), or give the card another address", card);
+        return;
+    }
+    const bool asked = look_for_devices(p, card, &devices);
+    if (devices.count > 1)
+        remedy(find(p->findings, "conflict", GRADE_FAULT, "%u devices have the address %s, among them %s and %s",
+                    devices.count, card, devices.mac[0], devices.mac[1]),
+               false, "give each card an address of its own (jumpers, or hm2flash --set ip=...)");
+    else if (asked && devices.count == 0)
+        find(p->findings, "conflict", GRADE_UNKNOWN, "no device answers for the address %s", card);
+    else if (!asked)
+        find(p->findings, "conflict", GRADE_UNKNOWN, "whether several devices have the address is shown to root only");
+    else
+        find(p->findings, "conflict", GRADE_OK, "one device has the address %s", card);
+}
+
 static void check_reverse_path(struct patient *const p)
 {
     long long all = 0, own = 0;
@@ -184,6 +259,7 @@ void check_way(struct patient *const p)
     if (p->interface[0] && strcmp(p->interface, "lo") != 0) {
         check_sharing(p);
         check_neighbour(p);
+        check_conflict(p);
         check_reverse_path(p);
     }
     check_firewall(p);

@@ -1,9 +1,14 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "live.h"
 
+#include <arpa/inet.h>
 #include <linux/ethtool.h>
 #include <linux/sockios.h>
+#include <net/ethernet.h>
 #include <net/if.h>
+#include <netinet/if_ether.h>
+#include <netpacket/packet.h>
+#include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -117,12 +122,74 @@ static bool ask_firewall(const char *const unused, struct answer *const answer)
     return command_run("PATH=$PATH:/usr/sbin nft list ruleset", answer->text, answer->cap) == 0;
 }
 
+/* ---- ARP -----------------------------------------------------------------------------------------------------------
+ */
+
+#define ANSWERS_MS  300 /* all devices of a local network answer within a few */
+#define MAX_ANSWERS 64u
+
+/* A probe (RFC 5227): it asks without an address of its own, so nobody learns anything from it. */
+static bool send_probe(const int fd, const int interface, const struct in_addr address, const uint8_t own[ETH_ALEN])
+{
+    struct sockaddr_ll to = {.sll_family = AF_PACKET,
+                             .sll_protocol = htons(ETH_P_ARP),
+                             .sll_ifindex = interface,
+                             .sll_halen = ETH_ALEN,
+                             .sll_addr = {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF}};
+    struct ether_arp probe = {.ea_hdr = {.ar_hrd = htons(ARPHRD_ETHER),
+                                         .ar_pro = htons(ETH_P_IP),
+                                         .ar_hln = ETH_ALEN,
+                                         .ar_pln = sizeof address,
+                                         .ar_op = htons(ARPOP_REQUEST)}};
+    memcpy(probe.arp_sha, own, ETH_ALEN);
+    memcpy(probe.arp_tpa, &address, sizeof address);
+    return sendto(fd, &probe, sizeof probe, 0, (const struct sockaddr *)&to, sizeof to) == (ssize_t)sizeof probe;
+}
+
+static void take_answers(const int fd, const struct in_addr address, struct answer *const answer)
+{
+    struct pollfd ready = {.fd = fd, .events = POLLIN};
+    for (unsigned i = 0; i < MAX_ANSWERS && poll(&ready, 1, ANSWERS_MS) == 1; i++) {
+        struct ether_arp arp;
+        if (recv(fd, &arp, sizeof arp, MSG_DONTWAIT) != (ssize_t)sizeof arp || arp.ea_hdr.ar_op != htons(ARPOP_REPLY) ||
+            memcmp(arp.arp_spa, &address, sizeof address) != 0)
+            continue;
+        const uint8_t *const mac = arp.arp_sha;
+        say(answer, "reply %02x:%02x:%02x:%02x:%02x:%02x\n", mac[0], mac[1], mac[2], mac[3], mac[4], mac[5]);
+    }
+}
+
+/* INTERFACE/ADDRESS. Needs the right to use packet sockets. */
+static bool ask_arp(const char *const rest, struct answer *const answer)
+{
+    struct ifreq request = {.ifr_ifindex = 0};
+    struct in_addr address;
+    const size_t len = strcspn(rest, "/");
+    if (len >= sizeof request.ifr_name || rest[len] != '/' || inet_pton(AF_INET, rest + len + 1, &address) != 1)
+        return false;
+    memcpy(request.ifr_name, rest, len);
+    const int fd = socket(AF_PACKET, SOCK_DGRAM | SOCK_CLOEXEC, htons(ETH_P_ARP));
+    bool asked = false;
+    if (fd >= 0 && ioctl(fd, SIOCGIFHWADDR, &request) == 0) {
+        uint8_t own[ETH_ALEN];
+        memcpy(own, request.ifr_hwaddr.sa_data, sizeof own);
+        asked = ioctl(fd, SIOCGIFINDEX, &request) == 0 && send_probe(fd, request.ifr_ifindex, address, own);
+    }
+    if (asked) {
+        say(answer, "asked 1\n");
+        take_answers(fd, address, answer);
+    }
+    if (fd >= 0)
+        close(fd);
+    return asked;
+}
+
 bool live_ask(const char *const question, char *const text, const size_t cap)
 {
     static const struct {
         const char *name;
         bool (*ask)(const char *rest, struct answer *answer);
-    } questions[] = {{"ethtool/", ask_ethtool}, {"limits", ask_limits}, {"firewall", ask_firewall}};
+    } questions[] = {{"ethtool/", ask_ethtool}, {"limits", ask_limits}, {"firewall", ask_firewall}, {"arp/", ask_arp}};
     struct answer answer = {.text = text, .cap = cap};
     for (size_t i = 0; i < sizeof questions / sizeof questions[0]; i++) {
         const size_t len = strlen(questions[i].name);
