@@ -217,6 +217,16 @@ static int check_fpga(const struct flash_board *const board, const struct flash_
     return err;
 }
 
+/* The card would start its fallback image instead: a nuisance, and no danger (H18). */
+static int check_damage(const struct flash_image *const image, struct hm2_diag *const diag)
+{
+    return image->hazards & FLASH_HAZARD_DAMAGED
+               ? hm2_diag_add(diag, HM2_ERR_MISMATCH,
+                              "the image is damaged: its contents do not fit the check sums in it, and no card would "
+                              "start it. Load the file again")
+               : 0;
+}
+
 int flash_check_image(const struct flash_card *const card, const struct flash_image *const image,
                       const struct flash_options *const options, struct hm2_diag *const diag)
 {
@@ -227,6 +237,7 @@ int flash_check_image(const struct flash_card *const card, const struct flash_im
         board->family == image->family ? check_area(image, options, diag) : 0,
         flash_check_fits(card, image, options->area, diag),
         overridden(options) ? 0 : check_size(image, diag),
+        overridden(options) ? 0 : check_damage(image, diag),
         overridden(options) ? 0 : check_name(board, image, options, diag),
         overridden(options) || image->family != FLASH_XILINX ? 0 : check_design(board, image, diag),
         options->area == FLASH_FALLBACK && !options->confirmed

@@ -30,6 +30,13 @@ void flash_copy_text(char *to, const uint8_t *from, size_t len);
 int flash_xilinx_parse(const uint8_t *data, size_t len, struct flash_image *image, struct hm2_diag *diag);
 int flash_efinix_parse(const uint8_t *data, size_t len, struct flash_image *image, struct hm2_diag *diag);
 
+/*
+ * The check sum of a Spartan-6 configuration: of each word that is written to a register. x^22 + x^15 + x^12 + x^7 + 1,
+ * one step a word, and the word enters with the register's number in front. No document gives it; it was found from
+ * files of Xilinx's own tool for five FPGAs (those of Debian's openfpgaloader) and fits both check sums of each.
+ */
+uint32_t flash_spartan6_crc(uint32_t crc, unsigned reg, unsigned word);
+
 /* Where a bitstream begins: behind nothing but what its format puts in front of its sync word. */
 bool flash_xilinx_sync(const uint8_t *data, size_t len, size_t *at);
 bool flash_efinix_sync(const uint8_t *data, size_t len, size_t *at, bool *pointers);

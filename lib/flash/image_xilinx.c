@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Xilinx .bit files, and the Spartan-6 packets in them up to the frame data (flash tool reference 3.10). */
+/* Xilinx .bit files, and the Spartan-6 packets in them (flash tool reference 3.10). */
 #include <string.h>
 
 #include "image.h"
@@ -9,16 +9,13 @@
 static const uint8_t magic[] = {0x00, 0x09, 0x0F, 0xF0, 0x0F, 0xF0, 0x0F, 0xF0, 0x0F, 0xF0, 0x00, 0x00, 0x01};
 static const uint8_t sync_word[4] = {0xAA, 0x99, 0x55, 0x66};
 
-/* Type 1 packet headers that write one register, of one or two words. */
+/* A packet header: type, what to do, register, number of words that follow (in type 2 they have a word of their own).
+ */
+enum { TYPE_SHIFT = 13, OP_SHIFT = 11, OP_MASK = 3, REGISTER_SHIFT = 5, REGISTER_MASK = 0x3F, COUNT_MASK = 0x1F };
+enum { TYPE_1 = 1, OP_NOP = 0, OP_WRITE = 2 };
 enum {
-    TYPE_1_WRITE = 0x3000,
-    TYPE_2_WRITE = 0x5000,
-    TYPE_MASK = 0xF800,
-    REGISTER_SHIFT = 5,
-    REGISTER_MASK = 0x3F,
-    COUNT_MASK = 0x1F
-};
-enum {
+    REG_CRC = 0,
+    REG_FRAMES = 3,
     REG_CMD = 5,
     REG_COR1 = 10,
     REG_COR2 = 11,
@@ -27,6 +24,8 @@ enum {
     REG_GENERAL5 = 23,
     REG_MODE = 24
 };
+enum { CMD_RESET_CRC = 7, CMD_DESYNC = 13 };
+#define FRAMES_HEADER       (0x5000u | REG_FRAMES << 5) /* type 2: the number of words has two words of its own */
 #define COR2_RESET_ON_ERROR 0x8000u
 #define COR1_CRC_BYPASS     0x0010u
 
@@ -75,43 +74,109 @@ static int take_payload(struct flash_stream *const stream, struct flash_image *c
     return 0;
 }
 
-static void take_register(struct flash_image *const image, const unsigned reg, const unsigned value,
-                          bool *const has_cor2)
+uint32_t flash_spartan6_crc(const uint32_t crc, const unsigned reg, const unsigned word)
 {
+    const uint32_t taps = crc >> 21 & 1u ? 0x009081u : 0;
+    return ((crc << 1 & 0x3FFFFFu) ^ taps ^ ((uint32_t)reg << 16 | word)) & 0x3FFFFFu;
+}
+
+struct scan {
+    struct flash_stream stream;
+    struct flash_image *image;
+    uint32_t crc;
+    bool has_cor2, frames, checked, ended;
+};
+
+static void take_register(struct scan *const scan, const unsigned reg, const unsigned value)
+{
+    struct flash_image *const image = scan->image;
     if ((reg >= REG_GENERAL1 && reg <= REG_GENERAL5) || reg == REG_MODE)
         image->hazards |= FLASH_HAZARD_MULTIBOOT;
     if (reg == REG_COR1 && (value & COR1_CRC_BYPASS))
         image->hazards |= FLASH_HAZARD_NO_CRC;
     if (reg == REG_COR2) {
-        *has_cor2 = true;
+        scan->has_cor2 = true;
         if (!(value & COR2_RESET_ON_ERROR))
             image->hazards |= FLASH_HAZARD_NO_RESET;
     }
 }
 
-/* Walk over the packets in front of the frame data. The walk is bounded by the payload, each step takes two bytes. */
+/* Two words that the FPGA compares with its own sum. Without check sum the tool writes something else there. */
+static void compare_crc(struct scan *const scan, const uint8_t *const data)
+{
+    const uint32_t value = (uint32_t)get_be16(data) << 16 | get_be16(data + 2);
+    scan->checked = true;
+    if (value != scan->crc && !(scan->image->hazards & FLASH_HAZARD_NO_CRC))
+        scan->image->hazards |= FLASH_HAZARD_DAMAGED;
+}
+
+/* Words written to one register; false when the file has fewer. */
+static bool take_words(struct scan *const scan, const unsigned reg, const size_t words)
+{
+    const uint8_t *const data = words <= scan->stream.left / 2 ? flash_take(&scan->stream, 2 * words) : NULL;
+    if (!data)
+        return false;
+    if (words == 2 && reg == REG_CRC) {
+        compare_crc(scan, data);
+        return true;
+    }
+    if (words > 0)
+        take_register(scan, reg, get_be16(data));
+    if (words == 2 && reg == REG_IDCODE)
+        scan->image->idcode = (uint32_t)get_be16(data) << 16 | get_be16(data + 2);
+    for (size_t i = 0; i < words; i++)
+        scan->crc = flash_spartan6_crc(scan->crc, reg, get_be16(data + 2 * i));
+    if (words == 1 && reg == REG_CMD && get_be16(data) == CMD_RESET_CRC)
+        scan->crc = 0;
+    scan->ended = scan->ended || (words == 1 && reg == REG_CMD && get_be16(data) == CMD_DESYNC);
+    return true;
+}
+
+/* Frame data, and the check sum right behind them. */
+static bool take_frames(struct scan *const scan)
+{
+    const uint8_t *const count = flash_take(&scan->stream, 4);
+    if (!count || !take_words(scan, REG_FRAMES, (size_t)get_be16(count) << 16 | get_be16(count + 2)))
+        return false;
+    const uint8_t *const sum = flash_take(&scan->stream, 4);
+    scan->frames = true;
+    if (sum)
+        compare_crc(scan, sum);
+    return sum != NULL;
+}
+
+/* One packet; false at the end, or where what follows is no packet. */
+static bool take_packet(struct scan *const scan)
+{
+    const uint8_t *const word = flash_take(&scan->stream, 2);
+    if (!word || scan->ended)
+        return false;
+    const unsigned header = get_be16(word), type = header >> TYPE_SHIFT, op = header >> OP_SHIFT & OP_MASK;
+    const unsigned reg = header >> REGISTER_SHIFT & REGISTER_MASK;
+    bool whole = true;
+    if (header == FRAMES_HEADER)
+        whole = take_frames(scan);
+    else if (type == TYPE_1 && op == OP_WRITE)
+        whole = take_words(scan, reg, header & COUNT_MASK);
+    else if (type != TYPE_1 || op != OP_NOP)
+        return false;
+    if (!whole)
+        scan->image->hazards |= FLASH_HAZARD_DAMAGED;
+    return whole;
+}
+
+/* Walk over the packets; each takes two bytes at least. */
 static void scan_packets(struct flash_image *const image)
 {
     const size_t start = image->sync_at + sizeof sync_word;
-    struct flash_stream stream = {image->payload + start, image->payload_bytes - start};
-    const uint8_t *word;
-    bool has_cor2 = false;
-    while ((word = flash_take(&stream, 2)) != NULL) {
-        const unsigned header = get_be16(word), type = header & TYPE_MASK;
-        if (type == TYPE_2_WRITE)
-            break; /* frame data */
-        if (type != TYPE_1_WRITE)
-            continue;
-        const unsigned reg = header >> REGISTER_SHIFT & REGISTER_MASK, words = header & COUNT_MASK;
-        const uint8_t *const data = flash_take(&stream, 2 * (size_t)words);
-        if (!data)
-            break;
-        if (words > 0)
-            take_register(image, reg, get_be16(data), &has_cor2);
-        if (reg == REG_IDCODE && words == 2)
-            image->idcode = (uint32_t)get_be16(data) << 16 | get_be16(data + 2);
-    }
-    if (!has_cor2)
+    struct scan scan = {.stream = {image->payload + start, image->payload_bytes - start}, .image = image};
+    while (take_packet(&scan))
+        ;
+    if (!scan.ended || !scan.frames)
+        image->hazards |= FLASH_HAZARD_DAMAGED;
+    if (!scan.checked)
+        image->hazards |= FLASH_HAZARD_NO_CRC;
+    if (!scan.has_cor2)
         image->hazards |= FLASH_HAZARD_NO_RESET;
     if (image->idcode == 0)
         image->hazards |= FLASH_HAZARD_NO_IDCODE;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * Loading an image as the FPGA does: Spartan-6 packets (flash tool reference 3.8, 3.10, 3.13), Trion by its sync word.
- * The check sums are the simulation's own: from the sync word to the packet that carries it; of header and body.
+ * Trion's check sum is the simulation's own, of header and body.
  */
 #include "boot.h"
 
@@ -34,6 +34,15 @@ uint32_t sim_check_sum(uint32_t sum, const uint8_t *const bytes, const size_t le
     return sum;
 }
 
+uint32_t sim_spartan6_crc(uint32_t crc, const unsigned reg, const unsigned word)
+{
+    enum { BITS = 22, TAPS = 1 << 15 | 1 << 12 | 1 << 7 | 1 };
+    crc <<= 1;
+    if (crc >> BITS)
+        crc ^= 1u << BITS | TAPS;
+    return crc ^ (reg << 16 | word);
+}
+
 void sim_boot_block(const uint32_t flash_size, uint8_t block[const SIM_BOOT_BLOCK_BYTES])
 {
     static const uint8_t of_16_mbit[SIM_BOOT_BLOCK_BYTES] = {
@@ -51,8 +60,9 @@ void sim_boot_block(const uint32_t flash_size, uint8_t block[const SIM_BOOT_BLOC
 static bool for_this_board(const struct sim_boot_flash *const flash, const uint8_t *const stamp)
 {
     const char *const name = flash->profile->card_name;
-    return memcmp(stamp, sim_stamp, sizeof sim_stamp) == 0 &&
-           strncmp((const char *)stamp + SIM_STAMP_BOARD_AT, name, SIM_STAMP_BYTES - SIM_STAMP_BOARD_AT) == 0;
+    if (memcmp(stamp, sim_stamp, sizeof sim_stamp) != 0)
+        return flash->trust; /* a real one */
+    return strncmp((const char *)stamp + SIM_STAMP_BOARD_AT, name, SIM_STAMP_BYTES - SIM_STAMP_BOARD_AT) == 0;
 }
 
 /* The stamp is that of an image whose check sum is right; NULL = an image that is trusted without. */
@@ -67,16 +77,16 @@ static enum sim_boot started(const struct sim_boot_flash *const flash, const uin
 /* ---- Spartan-6 ----------------------------------------------------------------------------------------------------
  */
 
-enum { REG_CRC = 0, REG_CMD = 5, REG_IDCODE = 14, REG_GENERAL1 = 19, REG_GENERAL4 = 22 };
-enum { CMD_DESYNC = 13, CMD_IPROG = 14 };
-enum { TYPE_1_NOP = 1, TYPE_1_WRITE = 1, TYPE_2 = 2 };
+enum { REG_CRC = 0, REG_FRAMES = 3, REG_CMD = 5, REG_IDCODE = 14, REG_GENERAL1 = 19, REG_GENERAL4 = 22 };
+enum { CMD_RESET_CRC = 7, CMD_DESYNC = 13, CMD_IPROG = 14 };
+enum { TYPE_1_NOP = 1, TYPE_1_WRITE = 1, TYPE_2 = 2, FRAMES_HEADER = 0x5000 | REG_FRAMES << 5 };
 
 /* The watchdog lets 65535 clocks pass until the sync word, one bit each. */
 #define SYNC_WITHIN_BYTES 8191u
 
 struct loading {
     const struct sim_boot_flash *flash;
-    uint32_t start, at, sync;
+    uint32_t start, at, crc;
     uint16_t general[4];
     const uint8_t *frames;
     uint32_t frame_bytes;
@@ -98,41 +108,47 @@ static bool find_sync(struct loading *const l)
     for (uint32_t i = 0; i < SYNC_WITHIN_BYTES && l->start + i + sizeof sync <= l->flash->size; i++) {
         if (memcmp(l->flash->bytes + l->start + i, sync, sizeof sync) != 0)
             continue;
-        l->sync = l->start + i;
-        l->at = l->sync + (uint32_t)sizeof sync;
+        l->at = l->start + i + (uint32_t)sizeof sync;
         return true;
     }
     return false;
 }
 
+/* Two words that must be the sum of what was written so far. */
+static bool check_crc(struct loading *const l, const uint32_t value)
+{
+    l->checked = true;
+    l->proven = value == l->crc;
+    return l->proven || l->flash->trust;
+}
+
 /* A register of so many words is written; false = the FPGA gives up. */
 static bool write_register(struct loading *const l, const unsigned reg, const unsigned count)
 {
-    const uint32_t packet = l->at - 2;
-    uint32_t value = 0;
+    uint32_t value = 0, crc = l->crc;
     for (unsigned i = 0; i < count; i++) {
         unsigned next;
         if (!word(l, &next))
             return false;
         value = value << 16 | next;
+        crc = sim_spartan6_crc(crc, reg, next);
         if (i == 0 && reg >= REG_GENERAL1 && reg <= REG_GENERAL4)
             l->general[reg - REG_GENERAL1] = (uint16_t)next;
     }
+    if (reg == REG_CRC)
+        return check_crc(l, value);
+    l->crc = reg == REG_CMD && value == CMD_RESET_CRC ? 0 : crc;
     if (reg == REG_IDCODE) {
         l->right_fpga = value == l->flash->profile->idcode;
         return l->right_fpga;
     }
-    if (reg == REG_CRC) {
-        l->checked = true;
-        l->proven = value == sim_check_sum(1, l->flash->bytes + l->sync, packet - l->sync);
-        return l->proven || l->flash->trust;
-    }
     return true;
 }
 
+/* Frames, and their check sum behind them. */
 static bool take_frames(struct loading *const l)
 {
-    unsigned high, low;
+    unsigned high, low, next;
     if (!word(l, &high) || !word(l, &low))
         return false;
     const uint32_t bytes = ((uint32_t)high << 16 | low) * 2u;
@@ -140,8 +156,9 @@ static bool take_frames(struct loading *const l)
         return false;
     l->frames = l->flash->bytes + l->at;
     l->frame_bytes = bytes;
-    l->at += bytes;
-    return true;
+    for (uint32_t i = 0; i < bytes / 2 && word(l, &next); i++)
+        l->crc = sim_spartan6_crc(l->crc, REG_FRAMES, next);
+    return word(l, &high) && word(l, &low) && check_crc(l, (uint32_t)high << 16 | low);
 }
 
 enum outcome { FAILED, JUMP, LOADED };
@@ -152,7 +169,7 @@ static enum outcome run_packets(struct loading *const l)
     while (word(l, &header)) {
         const unsigned type = header >> 13, op = header >> 11 & 3u, reg = header >> 5 & 0x3Fu, count = header & 0x1Fu;
         if (type == TYPE_2) {
-            if (!take_frames(l))
+            if (header != FRAMES_HEADER || !take_frames(l))
                 return FAILED;
             continue;
         }

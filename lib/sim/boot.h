@@ -35,7 +35,11 @@ enum sim_boot sim_boot_xilinx(const struct sim_boot_flash *flash, struct sim_boo
 /* Efinix: the user image when it is wanted and good, else the fallback. */
 enum sim_boot sim_boot_efinix(const struct sim_boot_flash *flash, bool want_user);
 
-/* What stands in for the check sum of an image. Start with 1; previous results go on. */
+/* The check sum of a Spartan-6 configuration, a word further (see tests/unit/test_flash_image.c for where it is from).
+ * Not the library's own: what the card does is computed independently. */
+uint32_t sim_spartan6_crc(uint32_t crc, unsigned reg, unsigned word);
+
+/* What stands in for the check sum of a Trion image, which nobody knows. Start with 1; previous results go on. */
 uint32_t sim_check_sum(uint32_t sum, const uint8_t *bytes, size_t len);
 
 /* The boot block of a chip, 64 bytes (flash tool reference 3.8). */

@@ -95,43 +95,68 @@ static void put_text(struct writer *const w, const char key, const char *const t
     put(w, text, strlen(text) + 1);
 }
 
-/* The registers GENERAL1 to 5 and MODE, or no-operations in their place. */
-static void put_boot_registers(struct writer *const w, const bool multiboot)
+enum { XILINX_BEFORE = 16 + 4 + 4 + 4 + 6 + 4 + 24 + 4 + 6 + 6, XILINX_BEHIND = 4 + 4 + 6 + 4 + 28 };
+
+/* The sum so far of words written to a register, from a place in the file on. */
+static uint32_t sum_words(const struct writer *const w, uint32_t crc, const unsigned reg, size_t at, const size_t end)
 {
-    static const uint16_t registers[] = {0x3261, 0x3281, 0x32A1, 0x32C1, 0x32E1, 0x3301};
-    for (size_t i = 0; i < sizeof registers / sizeof registers[0]; i++) {
-        put_be16(w, multiboot ? registers[i] : 0x2000u);
-        put_be16(w, multiboot ? 0 : 0x2000u);
-    }
+    for (; at + 2 <= end && end <= w->capacity; at += 2)
+        crc = sim_spartan6_crc(crc, reg, (unsigned)w->out[at] << 8 | w->out[at + 1]);
+    return crc;
 }
 
-enum { XILINX_BEFORE = 16 + 4 + 4 + 4 + 6 + 4 + 24 + 4 + 6 + 6, XILINX_BEHIND = 6 + 4 + 4 + 28 };
+/* A register of one word, or two, and what that does to the sum. */
+static uint32_t put_register(struct writer *const w, const uint32_t crc, const unsigned reg, const unsigned words,
+                             const uint32_t value)
+{
+    put_be16(w, 0x3000u | reg << 5 | words);
+    const size_t at = w->len;
+    if (words == 2)
+        put_be32(w, value);
+    else
+        put_be16(w, value);
+    return sum_words(w, crc, reg, at, w->len);
+}
 
+/* The registers GENERAL1 to 5 and MODE, or no-operations in their place. */
+static uint32_t put_boot_registers(struct writer *const w, uint32_t crc, const bool multiboot)
+{
+    static const unsigned registers[] = {19, 20, 21, 22, 23, 24};
+    for (size_t i = 0; i < sizeof registers / sizeof registers[0]; i++) {
+        if (multiboot)
+            crc = put_register(w, crc, registers[i], 1, 0);
+        else
+            put_be32(w, 0x20002000u);
+    }
+    return crc;
+}
+
+/* In the order of real files: the sum begins anew with a command, and is compared behind the frames and at the end. */
 static void put_packets(struct writer *const w, const struct sim_flash_file *const file,
                         const struct sim_profile *const profile, const size_t frame_bytes)
 {
+    enum { REG_CRC = 0, REG_FRAME_ADDRESS = 1, REG_FRAMES = 3, REG_CMD = 5, REG_COR1 = 10, REG_COR2, REG_IDCODE = 14 };
+    enum { CMD_WRITE = 1, CMD_START = 5, CMD_RESET_CRC = 7, CMD_DESYNC = 13 };
     static const uint8_t dummy[16] = {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF,
                                       0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
     put(w, dummy, sizeof dummy);
-    const size_t sync = w->len;
     put_be32(w, file->faults & SIM_FILE_NO_SYNC ? 0xAA995567u : 0xAA995566u);
-    put_be32(w, 0x31410000u | COR1 | (file->faults & SIM_FILE_NO_CRC ? COR1_CRC_BYPASS : 0));
-    put_be32(w, 0x31610000u | (file->faults & SIM_FILE_NO_RESET_ON_ERROR ? COR2 & ~COR2_RESET : COR2));
-    put_be16(w, 0x31C2);
-    put_be32(w, file->idcode ? file->idcode : profile->idcode);
-    put_be32(w, 0x30A10007);
-    put_boot_registers(w, file->faults & SIM_FILE_MULTIBOOT);
-    put_be32(w, 0x30A10001);
-    put_be16(w, 0x3022);
-    put_be32(w, 0);
-    put_be16(w, 0x5060);
+    (void)put_register(w, 0, REG_CMD, 1, CMD_RESET_CRC);
+    uint32_t crc = put_register(w, 0, REG_COR1, 1, COR1 | (file->faults & SIM_FILE_NO_CRC ? COR1_CRC_BYPASS : 0));
+    crc = put_register(w, crc, REG_COR2, 1, file->faults & SIM_FILE_NO_RESET_ON_ERROR ? COR2 & ~COR2_RESET : COR2);
+    crc = put_register(w, crc, REG_IDCODE, 2, file->idcode ? file->idcode : profile->idcode);
+    crc = put_boot_registers(w, crc, file->faults & SIM_FILE_MULTIBOOT);
+    crc = put_register(w, crc, REG_CMD, 1, CMD_WRITE);
+    crc = put_register(w, crc, REG_FRAME_ADDRESS, 2, 0);
+    put_be16(w, 0x5000u | REG_FRAMES << 5);
     put_be32(w, (uint32_t)(frame_bytes / 2));
+    const size_t frames = w->len;
     put_body(w, file, profile, frame_bytes);
-    const uint32_t crc = w->len <= w->capacity ? sim_check_sum(1, w->out + sync, w->len - sync) : 0;
-    put_be16(w, 0x3002);
+    crc = sum_words(w, crc, REG_FRAMES, frames, w->len);
     put_be32(w, crc);
-    put_be32(w, 0x30A10005);
-    put_be32(w, 0x30A1000D);
+    crc = put_register(w, crc, REG_CMD, 1, CMD_START);
+    (void)put_register(w, crc, REG_CRC, 2, crc);
+    (void)put_register(w, 0, REG_CMD, 1, CMD_DESYNC);
     for (unsigned i = 0; i < 14; i++)
         put_be16(w, 0x2000);
 }

@@ -263,7 +263,7 @@ END_TEST
 
 /* ---- images that must not get in --------------------------------------------------------------------------------- */
 
-enum damage { WHOLE, CUT_OFF, TRAILING, RAW, EMPTY };
+enum damage { WHOLE, CUT_OFF, TRAILING, RAW, EMPTY, FLIPPED };
 
 static const struct wrong {
     const char *what, *name;
@@ -282,6 +282,7 @@ static const struct wrong {
     {"cut off", "7i93.bit", 0, {.profile = "7i93"}, {NULL}, CUT_OFF},
     {"bytes behind it", "7i93.bit", 0, {.profile = "7i93"}, {NULL}, TRAILING},
     {"raw bits", "7i93.bin", 0, {.profile = "7i93"}, {NULL}, RAW},
+    {"one wrong bit", "7i93.bit", 0, {.profile = "7i93"}, {NULL}, FLIPPED},
     {"empty", "7i93.bit", 0, {.profile = "7i93"}, {NULL}, EMPTY},
     {"too short", "7i93.bit", 0, {.profile = "7i93", .bytes = 100000}, {NULL}, WHOLE},
     {"too long", "7i93.bit", 0, {.profile = "7i93", .bytes = 1000000}, {NULL}, WHOLE},
@@ -319,6 +320,10 @@ static void damage_file(const char *const path, const enum damage damage)
     FILE *const out = fopen(path, "wb");
     ck_assert_ptr_nonnull(out);
     ck_assert_uint_eq(fwrite(bytes + from, 1, keep, out), keep);
+    if (damage == FLIPPED) {
+        ck_assert_int_eq(fseek(out, MANY, SEEK_SET), 0);
+        ck_assert_int_ne(fputc(bytes[MANY] ^ 1, out), EOF);
+    }
     if (damage == TRAILING)
         ck_assert_uint_eq(fwrite(bytes, 1, MANY, out), MANY);
     ck_assert_int_eq(fclose(out), 0);

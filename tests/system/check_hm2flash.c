@@ -88,6 +88,17 @@ START_TEST(tells_what_is_wrong_by_its_exit_status)
     printed("No 7I96S board found\n");
     printed("192.168.1.121");
     run(REFUSED, "--info", "/nonexistent");
+    const char *const image = flash_rig_image("7i93.bit", &(struct sim_flash_file){.profile = "7i93"});
+    run(DONE, "--info", image);
+    FILE *const file = fopen(image, "r+b");
+    ck_assert_ptr_nonnull(file);
+    ck_assert_int_eq(fseek(file, 100000, SEEK_SET), 0);
+    ck_assert_uint_eq(fwrite("damaged!", 1, 8, file), 8);
+    ck_assert_int_eq(fclose(file), 0);
+    run(FAILED, "--info", image);
+    printed("the file is damaged");
+    run(FAILED, "--info", image, "--json");
+    printed("\"damaged\": true, \"safe\": false");
     run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--rpo", "garbage");
     run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--wpo", "0x1000");
     run(USAGE, "--device", "7i96s", "--addr", sim.address[0], "--set", "ip=");

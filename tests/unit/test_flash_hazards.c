@@ -98,6 +98,17 @@ static void an_override_must_name_the_card(void **state)
     flash_rig_assert_refused(rig, HM2_ERR_MISMATCH, "wrong bitfile destination device");
 }
 
+static void a_damaged_image_is_refused(void **state)
+{
+    struct flash_rig *const rig = *state;
+    rig->file[rig->len / 2] ^= 0x08;
+    assert_int_equal(flash_image_parse(rig->file, rig->len, &rig->image, &rig->diag), 0);
+    flash_rig_assert_refused(rig, HM2_ERR_MISMATCH, "the image is damaged: its contents do not fit the check sums");
+    rig->options.override = "7I93"; /* the card starts its fallback image then */
+    flash_rig_must_write(rig);
+    assert_int_equal(sim_card_would_boot(rig->sim), SIM_BOOT_FALLBACK);
+}
+
 static void an_image_that_does_not_fit_is_refused(void **state)
 {
     struct flash_rig *const rig = *state;
@@ -431,6 +442,7 @@ int main(void)
         ON_7I93(takes_names_in_any_spelling),
         ON_7I93(a_list_of_known_images_tells_what_names_do_not),
         ON_7I93(an_override_must_name_the_card),
+        ON_7I93(a_damaged_image_is_refused),
         ON_7I93(an_image_that_does_not_fit_is_refused),
         ON_7I93(the_fallback_area_needs_a_confirmation),
         ON_7I96S(the_fallback_area_needs_a_confirmation),

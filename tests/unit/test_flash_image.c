@@ -2,6 +2,9 @@
 /* Image files, checksum files, boot blocks, and the tables of cards and chips. */
 #include "unit.h"
 
+#include "../../lib/flash/image.h"
+#include "boot.h"
+
 #include <hm2/flash.h>
 #include <hm2/sim_flash.h>
 
@@ -39,6 +42,49 @@ static void takes_a_bit_file_apart(void **state)
     assert_int_equal(image.hazards, 0);
     assert_int_equal(image.sync_at, 16);
     assert_ptr_equal(image.payload + image.payload_bytes, file + len);
+}
+
+/* Both check sums of bit files that Xilinx's own tool made: the one behind the frames, and that at the end, after six
+ * words more. (spiOverJtag of xc6slx9tqg144, -16ftg256, -45csg324, -100fgg484 and -150tfgg484, as in Debian's
+ * openfpgaloader 0.10.0; their whole contents give the first ones, too.) */
+static void the_check_sum_is_that_of_real_files(void **state)
+{
+    static const uint32_t sums[][2] = {
+        {0x0A727E, 0x1C8B42}, {0x1C667A, 0x13E154}, {0x364AAE, 0x0F617E}, {0x3FAE2F, 0x3255B7}, {0x3DE7C2, 0x210FF5}};
+    static const unsigned between[][2] = {{5, 0x0A}, {5, 3}, {5, 0x0A}, {5, 5}, {7, 0xFF}, {6, 0x81}};
+    (void)state;
+    for (size_t i = 0; i < sizeof sums / sizeof sums[0]; i++) {
+        uint32_t crc = sums[i][0], of_the_card = sums[i][0];
+        for (size_t j = 0; j < sizeof between / sizeof between[0]; j++) {
+            crc = flash_spartan6_crc(crc, between[j][0], between[j][1]);
+            of_the_card = sim_spartan6_crc(of_the_card, between[j][0], between[j][1]);
+        }
+        assert_int_equal(crc, sums[i][1]);
+        assert_int_equal(of_the_card, sums[i][1]);
+    }
+}
+
+/* H18 */
+static void finds_one_wrong_bit_anywhere_in_a_bit_file(void **state)
+{
+    struct flash_image image;
+    (void)state;
+    const size_t len = xilinx();
+    assert_int_equal(parse(len, &image, NULL), 0);
+    const size_t packets = (size_t)(image.payload - file) + image.sync_at + 4, end = len - 28; /* no-operations */
+    unsigned damaged = 0;
+    for (size_t at = packets; at < end; at += at < packets + 80 || at > end - 40 ? 1 : 1009) {
+        const size_t even = at - (at - packets) % 2;
+        if (file[even] == 0x20 && file[even + 1] == 0)
+            continue; /* a no-operation, whatever its other bits are */
+        file[at] ^= 0x10;
+        assert_int_equal(parse(len, &image, NULL), 0);
+        if (image.hazards == 0)
+            fail_msg("byte %zu of %zu", at, len);
+        damaged += (image.hazards & FLASH_HAZARD_DAMAGED) != 0;
+        file[at] ^= 0x10;
+    }
+    assert_true(damaged > 350);
 }
 
 static void takes_an_efinix_file_apart(void **state)
@@ -264,6 +310,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(takes_a_bit_file_apart),
+        cmocka_unit_test(the_check_sum_is_that_of_real_files),
+        cmocka_unit_test(finds_one_wrong_bit_anywhere_in_a_bit_file),
         cmocka_unit_test(takes_an_efinix_file_apart),
         cmocka_unit_test(refuses_every_shortened_file),
         cmocka_unit_test(refuses_a_file_with_more_than_it_announces),

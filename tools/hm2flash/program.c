@@ -548,6 +548,7 @@ static void json_image(const struct cli *const cli, const struct flash_image *co
     json_text(cli, "made", image->family == FLASH_XILINX ? image->date : image->generated);
     json_number(cli, "bytes", (double)image->payload_bytes);
     json_bool(cli, "fallback", image->pointers);
+    json_bool(cli, "damaged", image->hazards & FLASH_HAZARD_DAMAGED);
     json_bool(cli, "safe", image->hazards == 0);
     json_text(cli, "sha256", hash);
     json_end(cli);
@@ -563,9 +564,12 @@ int do_info(struct cli *const cli, const char *const arg)
         return complain(cli, REFUSED, "Can't open file %s: %s", arg, strerror(errno));
     const bool verbose = cli->verbose;
     cli->verbose = true;
-    const int status = parse_image(cli, bytes, len, &image);
+    int status = parse_image(cli, bytes, len, &image);
     cli->verbose = verbose;
-    if (status == DONE && cli->json) {
+    if (status == DONE && image.hazards & FLASH_HAZARD_DAMAGED)
+        status =
+            complain(cli, FAILED, "the file is damaged: its contents do not fit the check sums in it. Load it again");
+    if (status != REFUSED && cli->json) {
         sha256_text(bytes, len, hash);
         json_image(cli, &image, hash);
     }

@@ -106,6 +106,7 @@ enum flash_hazard {
     FLASH_HAZARD_NO_RESET = 2,  /* an error in it does not make the FPGA start the fallback image */
     FLASH_HAZARD_NO_CRC = 4,    /* its check sum is switched off */
     FLASH_HAZARD_NO_IDCODE = 8, /* names no FPGA in its packets */
+    FLASH_HAZARD_DAMAGED = 16,  /* its contents do not fit its check sums, or their length the file (H18) */
 };
 
 /* Take a file apart. Every length is checked against the bytes left. HM2_ERR_MALFORMED, HM2_ERR_UNSUPPORTED (raw .bin,
