@@ -3,6 +3,8 @@
 #include "unit.h"
 
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 
 #include <hm2/can.h>
 
@@ -551,6 +553,43 @@ static void an_interface_that_comes_back_takes_the_place_of_the_old_one(void **s
     assert_int_equal(other_closed, 3);
 }
 
+static void freed_close(struct hm2_can_bus *const base)
+{
+    free(base);
+}
+
+static const struct hm2_can_bus_ops freed_ops = {other_receive, other_send, freed_close};
+
+static void *run_cycles(void *const done)
+{
+    for (unsigned i = 0; i < 20000; i++)
+        cycle();
+    atomic_store((atomic_bool *)done, true);
+    return NULL;
+}
+
+/* A bus that is used after it was closed, or lost, is for the sanitizers to see. */
+static void buses_are_replaced_while_cycles_run(void **state)
+{
+    (void)state;
+    pthread_t thread;
+    atomic_bool done = false;
+    other = (struct hm2_can_bus){.ops = &other_ops};
+    hm2_can_replace_bus(can, &other); /* the test's own has room for some frames only */
+    cycle();
+    assert_int_equal(pthread_create(&thread, NULL, run_cycles, &done), 0);
+    do {
+        struct hm2_can_bus *const bus_of_heap = calloc(1, sizeof *bus_of_heap);
+        assert_non_null(bus_of_heap);
+        bus_of_heap->ops = &freed_ops;
+        hm2_can_close_old(can);
+        hm2_can_replace_bus(can, bus_of_heap);
+        hm2_can_tell_bus_off(can, false);
+    } while (!atomic_load(&done));
+    assert_int_equal(pthread_join(thread, NULL), 0);
+    expect("interface-down", 0);
+}
+
 static void the_end_of_bus_off_can_be_told(void **state)
 {
     (void)state;
@@ -592,6 +631,7 @@ int main(void)
         WITH_DRIVE(error_frames_tell_the_controllers_state),
         WITH_DRIVE(what_was_lost_is_flagged_and_sent_again),
         WITH_DRIVE(an_interface_that_comes_back_takes_the_place_of_the_old_one),
+        WITH_DRIVE(buses_are_replaced_while_cycles_run),
         WITH_DRIVE(the_end_of_bus_off_can_be_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
