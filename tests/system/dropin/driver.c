@@ -189,7 +189,7 @@ bool driver_load(struct driver *const driver, const char *const card, const char
     snprintf(line, sizeof line, "config=%s", config);
     /* The names of 7I80DB and 7I80HD say no more than 7i80 (hal-interface 1.3). */
     const char *const stem = strncmp(card, "7i80", 4) == 0 ? "7i80" : card;
-    snprintf(driver->prefix, sizeof driver->prefix, "hm2_%s.0.", stem);
+    snprintf(driver->prefix, sizeof driver->prefix, "hm2_%.*s.0.", (int)strcspn(stem, "_"), stem);
     open_host(driver);
     open_card(driver, card);
     if (kinds[driver->kind].before && !load(driver, kinds[driver->kind].before, NULL, 0))
