@@ -187,9 +187,10 @@ bool driver_load(struct driver *const driver, const char *const card, const char
     char line[512];
     const char *const arguments[] = {"board_ip=192.168.1.121", line, driver->parameter};
     snprintf(line, sizeof line, "config=%s", config);
-    /* The names of 7I80DB and 7I80HD say no more than 7i80 (hal-interface 1.3). */
-    const char *const stem = strncmp(card, "7i80", 4) == 0 ? "7i80" : card;
-    snprintf(driver->prefix, sizeof driver->prefix, "hm2_%.*s.0.", (int)strcspn(stem, "_"), stem);
+    /* The names of 7I80DB and 7I80HD say no more than 7i80 (hal-interface 1.3); behind an underscore is the firmware.
+     */
+    const int stem = strncmp(card, "7i80", 4) == 0 ? 4 : (int)strcspn(card, "_");
+    snprintf(driver->prefix, sizeof driver->prefix, "hm2_%.*s.0.", stem, card);
     open_host(driver);
     open_card(driver, card);
     if (kinds[driver->kind].before && !load(driver, kinds[driver->kind].before, NULL, 0))
