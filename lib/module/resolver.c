@@ -117,21 +117,24 @@ static void start(struct hm2_module *const module, const struct hm2_cycle *const
     }
 }
 
-/* Whole turns below a position. */
-static int64_t turns_below(const int64_t position, const int64_t per_index)
+#define ONE_TURN ((int64_t)1 << 32)
+
+/* Indices at or below a position. The first is where the turn after that of the start begins, as LinuxCNC's driver has
+ * it. */
+static int64_t indices_below(const int64_t position, const int64_t per_index)
 {
-    const int64_t down = position / per_index;
-    return position % per_index < 0 ? down - 1 : down;
+    const int64_t from_first = position - ONE_TURN, down = from_first / per_index;
+    return from_first % per_index < 0 ? down - 1 : down;
 }
 
 static void find_index(struct resolver *const r, const int64_t before)
 {
     const uint32_t divisor = *r->index_divisor ? *r->index_divisor : 1;
-    const int64_t per_index = (int64_t)divisor << 32;
-    const int64_t from = turns_below(before, per_index), to = turns_below(r->turned, per_index);
+    const int64_t per_index = divisor * ONE_TURN;
+    const int64_t from = indices_below(before, per_index), to = indices_below(r->turned, per_index);
     if (from == to)
         return;
-    r->zero = (from < to ? to : from) * per_index;
+    r->zero = (from < to ? to : from) * per_index + ONE_TURN;
     *r->index_enable = false;
 }
 

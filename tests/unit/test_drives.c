@@ -420,6 +420,34 @@ static void index_reset_and_position_file_of_a_resolver(void **state)
     rig_free(rig);
 }
 
+/* Turns are counted from that of the start; the index is where the next one begins, and every third from there. */
+static void an_index_is_found_every_few_turns(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = started(&hm2_resolver_type, "");
+    unsigned quarters = 1;
+    rig_put(rig, 0x4000, quarters << 30);
+    rig_cycle(rig);
+    rig_set(rig, "resolver.00.index-divisor", 3);
+    for (unsigned round = 0; round < 3; round++) {
+        rig_set(rig, "resolver.00.index-enable", 1);
+        while (rig_get(rig, "resolver.00.index-enable") == 1 && quarters < 100) {
+            rig_put(rig, 0x4000, ++quarters << 30);
+            rig_cycle(rig);
+        }
+        assert_int_equal(quarters, 4 + 12 * round);
+        assert_true(rig_get(rig, "resolver.00.position") == 0.0);
+    }
+    rig_set(rig, "resolver.00.index-enable", 1); /* and at the same place on the way back */
+    while (rig_get(rig, "resolver.00.index-enable") == 1 && quarters > 0) {
+        rig_put(rig, 0x4000, --quarters << 30);
+        rig_cycle(rig);
+    }
+    assert_int_equal(quarters, 4 + 12 * 2 - 1);
+    assert_true(rig_get(rig, "resolver.00.position") == -0.25);
+    rig_free(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -437,6 +465,7 @@ int main(void)
         cmocka_unit_test(recorded_positions_are_the_angles_of_the_bench),
         cmocka_unit_test(turns_are_counted_and_velocity_follows_the_excitation),
         cmocka_unit_test(index_reset_and_position_file_of_a_resolver),
+        cmocka_unit_test(an_index_is_found_every_few_turns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -135,6 +135,16 @@ static void drive_encoder(const struct driver *const driver, const int64_t clk, 
                      0);
 }
 
+static void attach_resolver(const struct driver *const driver, const struct event *const event)
+{
+    const unsigned channel = (unsigned)event->a;
+    const struct sim_resolver resolver = {.turns = event->b / 1000.0,
+                                          .amplitude = event->c / 1000.0,
+                                          .turns_per_s = event->d / 1000.0,
+                                          .pwmgen = channel};
+    ck_assert_int_eq(sim_card_resolver(driver->card, channel, &resolver), 0);
+}
+
 /* Edges of a disc, after the card's present. The disc's place follows from the cycle: the same in every run. */
 static void turn(const struct driver *const driver, const struct event *const event)
 {
@@ -176,6 +186,9 @@ static bool apply_event(const struct event *const event, struct driver *const dr
         break;
     case TURN:
         turn(driver, event);
+        break;
+    case RESOLVER:
+        attach_resolver(driver, event);
         break;
     case LOSE_REQUESTS:
         driver->lose_requests = true;

@@ -27,10 +27,13 @@ struct wave {
 };
 
 enum action {
-    FOLLOW,        /* encoder a turns with step generator b, c counts in d steps */
-    INDEX,         /* index input of encoder a is at level b */
-    PAD,           /* the world outside drives I/O a to level b */
-    TURN,          /* in each cycle of [cycle, to): encoder a makes b edges (its inputs are driven) */
+    FOLLOW, /* encoder a turns with step generator b, c counts in d steps */
+    INDEX,  /* index input of encoder a is at level b */
+    PAD,    /* the world outside drives I/O a to level b */
+    TURN,   /* in each cycle of [cycle, to): encoder a makes b edges (its inputs are driven) */
+    /* Resolver a stands at b thousandths of a turn, with c thousandths of the amplitude; PWM generator a turns it,
+     * d thousandths of a turn a second at full duty. */
+    RESOLVER,
     LOSE_REQUESTS, /* in [cycle, to) */
     LOSE_WRITES,   /* in [cycle, to) */
     NO_WRITE,      /* write() is not called in [cycle, to) */

@@ -280,6 +280,36 @@ static const struct event dpll_events[] = {
     {1, 0, FOLLOW, 0, 0, 4, 1},
 };
 
+/* ---- a 7I49: six resolvers, three of them on motors; index, reset, scales, excitation, a signal that goes away */
+
+static const struct setting resolver_settings[] = {
+    {0, "pwmgen.00.enable", 1},
+    {0, "pwmgen.02.enable", 1},
+    {0, "pwmgen.05.enable", 1},
+    {0, "resolver.02.scale", -3.5},
+    {0, "resolver.05.velocity-scale", 60},
+    {200, "resolver.00.index-enable", 1},
+    {300, "resolver.02.reset", 1},
+    {310, "resolver.02.reset", 0},
+    {400, "resolver.05.index-divisor", 3},
+    {400, "resolver.05.index-enable", 1},
+    {600, "resolver.excitation-khz", 5},
+    {800, "resolver.excitation-khz", 2},
+    {900, "resolver.excitation-khz", 9},
+};
+
+static const struct wave resolver_waves[] = {
+    {"pwmgen.00.value", WAVE_SINE, 1, 0, 500, 100, 1200},
+    {"pwmgen.02.value", WAVE_TRIANGLE, 0.7, -0.1, 300, 100, 1200},
+    {"pwmgen.05.value", WAVE_TRAPEZOID, 0.5, 0.4, 400, 100, 1200},
+};
+
+static const struct event resolver_events[] = {
+    {1, 0, RESOLVER, 0, 250, 900, 10000}, {1, 0, RESOLVER, 2, 0, 900, -5000}, {1, 0, RESOLVER, 5, -125, 900, 20000},
+    {1, 0, RESOLVER, 1, 300, 900, 0},     {400, 0, RESOLVER, 1, 300, 0, 0},   {500, 0, RESOLVER, 1, 350, 900, 0},
+    {1, 0, RESOLVER, 4, -450, 500, 0},
+};
+
 /* ---- a 7I93: four step generators, each with an encoder, and eight PWM generators */
 
 static const struct setting servo_settings[] = {
@@ -552,6 +582,8 @@ const struct scenario scenarios[] = {
     SCENARIO(bite, "7i96s", "", 1500, .reached = {{"watchdog.has_bit", 1}}),
     SCENARIO(loss, "7i96s", "", 1600, .reached = {{"io_error", 1}, {"watchdog.has_bit", 1}, {"packet-error-total", 5}}),
     SCENARIO(dpll, "7i96s", "", 800, .reached = {{"dpll.ddsize", 1}, {"encoder.00.count", 5000}}),
+    SCENARIO(resolver, "7i93_sv6_7i49", "", 1200,
+             .reached = {{"resolver.01.error", 1}, {"resolver.00.velocity", 5}, {"resolver.05.position", 1}}),
     SCENARIO(servo, "7i93", "num_encoders=8 num_pwmgens=8 num_stepgens=4", 1500,
              .reached = {{"encoder.03.count", 500}, {"encoder.06.count", 500}, {"stepgen.00.counts", 1000}}),
     SCENARIO(settings, "7i96s", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
