@@ -60,11 +60,27 @@ int64_t hm2_absenc_clocks_ns(const struct hm2_absenc_channel *const channel, con
 /* ---- set-up --------------------------------------------------------------------------------------------------------
  */
 
+/* The format of a channel, "" without one: without it there is no channel. */
+static const char *format_of(const struct hm2_config *const config, const uint8_t gtag, const unsigned channel)
+{
+    if (channel >= HM2_CFG_CHANNELS)
+        return "";
+    if (gtag == HM2_GTAG_SSI)
+        return config->ssi_format[channel];
+    return gtag == HM2_GTAG_BISS ? config->biss_format[channel] : config->fanuc_format[channel];
+}
+
+/* A channel's pins belong to it when it has a format. */
+static bool filter_pin(const struct hm2_pd *const pd, const struct hm2_setup *const setup)
+{
+    return format_of(setup->config, pd->secondary_tag, pd->secondary_unit)[0] != '\0';
+}
+
 static int add_channel(struct hm2_absenc *const ctx, struct hm2_module *const module, struct hm2_setup *const setup,
                        const unsigned number)
 {
     struct hm2_absenc_channel *const channel = &ctx->channel[ctx->count++];
-    const char *const format = hm2_absenc_expand(ctx->kind->formats(setup->config)[number]);
+    const char *const format = hm2_absenc_expand(format_of(setup->config, module->type->gtag, number));
     const unsigned bits = hm2_absenc_format_bits(format);
     char prefix[HM2_NAME_SIZE];
     if (bits == 0 || bits > ctx->kind->max_bits)
@@ -92,7 +108,7 @@ int hm2_absenc_setup(struct hm2_module *const module, struct hm2_setup *const se
 {
     unsigned wanted = 0;
     for (unsigned i = 0; i < module->instances; i++)
-        wanted += hm2_absenc_has_format(kind->formats(setup->config), i);
+        wanted += format_of(setup->config, module->type->gtag, i)[0] != '\0';
     if (wanted == 0)
         return 0;
     struct hm2_absenc *const ctx = hm2_setup_alloc(setup, sizeof *ctx + wanted * sizeof ctx->channel[0]);
@@ -100,12 +116,12 @@ int hm2_absenc_setup(struct hm2_module *const module, struct hm2_setup *const se
         return HM2_ERR_NOMEM;
     module->context = ctx;
     ctx->kind = kind;
-    int err = hm2_claim_pins(module, setup, HM2_GTAG_NONE, module->instances, true, kind->filter_pin);
+    int err = hm2_claim_pins(module, setup, HM2_GTAG_NONE, module->instances, true, filter_pin);
     if (!err)
         err = hm2_plan_add_read(setup->plan, &ctx->busy, HM2_RANK_FIRST,
                                 hm2_md_address(module->md, kind->busy_register, 0), 1, setup->diag);
     for (unsigned i = 0; !err && i < module->instances; i++)
-        if (hm2_absenc_has_format(kind->formats(setup->config), i))
+        if (format_of(setup->config, module->type->gtag, i)[0] != '\0')
             err = add_channel(ctx, module, setup, i);
     return err;
 }

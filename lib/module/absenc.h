@@ -37,8 +37,6 @@ struct hm2_absenc_channel {
 
 struct hm2_absenc_kind {
     unsigned max_bits, busy_register, controls;
-    const char (*(*formats)(const struct hm2_config *config))[HM2_CFG_FORMAT_SIZE];
-    bool (*filter_pin)(const struct hm2_pd *pd, const struct hm2_setup *setup);
     const struct hm2_point_group *group; /* points of a channel */
     /* Windows of the data words and sections of the control registers. */
     int (*add_registers)(struct hm2_absenc_channel *channel, struct hm2_module *module, struct hm2_setup *setup);
@@ -71,12 +69,6 @@ void hm2_absenc_write_lost(struct hm2_module *module);
                   "bit clock"),                                                                                   \
         HM2_POINT(struct hm2_absenc_channel, timer_number, "timer-number", HM2_U32, HM2_PARAM_RW, 0, "",          \
                   "DPLL timer that starts transfers, 1 to 4; 0 = every write does")
-
-/* A channel's pins belong to it when it has a format. */
-static inline bool hm2_absenc_has_format(const char formats[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE], const unsigned unit)
-{
-    return unit < HM2_CFG_CHANNELS && formats[unit][0];
-}
 
 /* Names of the output pins of SSI and BISS; Fanuc's have none. */
 const char *hm2_absenc_output_name(const struct hm2_pd *pd);

@@ -26,16 +26,6 @@ static const struct hm2_point_group groups[] = {
     {.prefix = NULL},
 };
 
-static const char (*formats(const struct hm2_config *const config))[HM2_CFG_FORMAT_SIZE]
-{
-    return config->biss_format;
-}
-
-static bool filter_pin(const struct hm2_pd *const pd, const struct hm2_setup *const setup)
-{
-    return hm2_absenc_has_format(setup->config->biss_format, pd->secondary_unit);
-}
-
 /* Each read of the one data register takes a word from the stack, the last bits first. Ranks keep them apart. */
 static int add_registers(struct hm2_absenc_channel *const channel, struct hm2_module *const module,
                          struct hm2_setup *const setup)
@@ -65,8 +55,6 @@ static const struct hm2_absenc_kind kind = {
     .max_bits = HM2_ABSENC_BITS,
     .busy_register = REG_GLOBAL,
     .controls = 2,
-    .formats = formats,
-    .filter_pin = filter_pin,
     .group = groups,
     .add_registers = add_registers,
     .set_registers = set_registers,

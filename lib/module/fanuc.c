@@ -39,16 +39,6 @@ static const struct hm2_point_group groups[] = {
     {.prefix = NULL},
 };
 
-static const char (*formats(const struct hm2_config *const config))[HM2_CFG_FORMAT_SIZE]
-{
-    return config->fanuc_format;
-}
-
-static bool filter_pin(const struct hm2_pd *const pd, const struct hm2_setup *const setup)
-{
-    return hm2_absenc_has_format(setup->config->fanuc_format, pd->secondary_unit);
-}
-
 /* The third data word is always read: it has the sign of a bad cable. */
 static int add_registers(struct hm2_absenc_channel *const channel, struct hm2_module *const module,
                          struct hm2_setup *const setup)
@@ -98,8 +88,6 @@ static const struct hm2_absenc_kind kind = {
     .max_bits = WORD_BITS,
     .busy_register = REG_GLOBAL,
     .controls = CONTROLS,
-    .formats = formats,
-    .filter_pin = filter_pin,
     .group = groups,
     .add_registers = add_registers,
     .set_registers = set_registers,

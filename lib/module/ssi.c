@@ -24,16 +24,6 @@ static const struct hm2_point_group groups[] = {
     {.prefix = NULL},
 };
 
-static const char (*formats(const struct hm2_config *const config))[HM2_CFG_FORMAT_SIZE]
-{
-    return config->ssi_format;
-}
-
-static bool filter_pin(const struct hm2_pd *const pd, const struct hm2_setup *const setup)
-{
-    return hm2_absenc_has_format(setup->config->ssi_format, pd->secondary_unit);
-}
-
 static int add_registers(struct hm2_absenc_channel *const channel, struct hm2_module *const module,
                          struct hm2_setup *const setup)
 {
@@ -61,8 +51,6 @@ static const struct hm2_absenc_kind kind = {
     .max_bits = BITS_MAX,
     .busy_register = REG_GLOBAL,
     .controls = 1,
-    .formats = formats,
-    .filter_pin = filter_pin,
     .group = groups,
     .add_registers = add_registers,
     .set_registers = set_registers,

@@ -196,11 +196,27 @@ static bool input_settled(const struct scanner *const s, const unsigned i)
     return s->counts[i] >= limit && (filtered || (slow && s->counts[i] > limit));
 }
 
-/* Looks change nothing any more. With a multiplexer its data must be through the glitch filter before each look. */
+/* All inputs of the multiplexer have one level, which is through the glitch filter. */
+static bool data_is_constant(const struct scanner *const s)
+{
+    const uint32_t seen = levels(s) & width_mask(s);
+    const bool level = seen != 0;
+    return (!level || seen == width_mask(s)) && s->data_late == level && s->data == level && s->sampled == level &&
+           s->glitch == (level ? GLITCH_TOP : 0);
+}
+
+/* What each look takes is the level of its input: the data is through the glitch filter before the look, or it is
+ * always the same. */
+static bool data_is_in_time(const struct scanner *const s)
+{
+    const bool slow = look_period(s) > (int64_t)GLITCH_EDGES + 1;
+    return (slow && s->sampled == level_at(s, s->index) && s->data == level_at(s, s->address)) || data_is_constant(s);
+}
+
+/* Looks change nothing any more. */
 static bool settled(const struct scanner *const s)
 {
-    if (s->multiplexed && (look_period(s) <= (int64_t)GLITCH_EDGES + 1 || s->sampled != level_at(s, s->index) ||
-                           s->data != level_at(s, s->address)))
+    if (s->multiplexed && !data_is_in_time(s))
         return false;
     for (unsigned i = 0; i < s->width; i++)
         if (!input_settled(s, i))

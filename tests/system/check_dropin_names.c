@@ -32,6 +32,7 @@ struct load {
 #define ABSOLUTE TEST_DATA "/firmware/absolute_48.hex"
 #define SSERIALB TEST_DATA "/firmware/sserialb_51.hex"
 #define DRIVES   TEST_DATA "/firmware/drives_29_48.hex"
+#define INMUX    TEST_DATA "/firmware/inmux_48.hex"
 
 static const struct load loads[] = {
     {"7i96s", "default", "", {NULL}},
@@ -80,6 +81,7 @@ static const struct load loads[] = {
      "ssi_chan_0=a%12ub%3fc%1b%2pd%12s ssi_chan_1=pos%25ge biss_chan_1=turns%12hturns%18l fanuc_chan_0=AA64",
      {"--firmware", ABSOLUTE}},
     {"7i93", "no-absolute", "", {"--firmware", ABSOLUTE}},
+    {"7i93", "inmux", "", {"--firmware", INMUX}},
     {"7i93", "drives", "", {"--firmware", DRIVES}},
     {"7i93",
      "fewer-drives",
@@ -264,6 +266,7 @@ static bool rests(const char *const name)
     } restless[] = {
         /* the select lines of multiplexed encoders */
         {"names/7i96s_7i77d/*", "gpio.041.in*"},
+        {"names/7i93/inmux", "gpio.00[1-4].in*"}, /* the address of multiplexed inputs */
         {"names/7i93_2x7i65/*", "gpio.0[13][37].in*"},
         {"names/7i93_sv12im_2x7i48/*", "gpio.0[13][04].in*"},
         /* a remote's watchdog bites, or not yet, while it is asked */

@@ -13,7 +13,6 @@
 
 enum { PIN_A = 0x01, PIN_B = 0x02, PIN_INDEX = 0x03 }; /* of encoders (register map 4.1) */
 #define BEHIND_MULTIPLEXER 0x40u                       /* of one encoder of a pair, see lib/sim/sim_muxed_encoder.c */
-#define PIN_FAULT          0x08u                       /* of three-phase PWM generators */
 #define EDGE_NS            5000
 
 static void set_point(const struct driver *const driver, const char *const name, const double value)
@@ -206,9 +205,9 @@ static bool apply_event(const struct event *const event, struct driver *const dr
     case ABSOLUTE_GRAY:
         show_absolute(driver, event);
         break;
-    case FAULT:
-        ck_assert_int_eq(sim_card_drive_input(driver->card, clk, HM2_GTAG_TPPWM, (unsigned)event->a, PIN_FAULT,
-                                              event->b ? SIM_HIGH : SIM_LOW),
+    case INPUT:
+        ck_assert_int_eq(sim_card_drive_input(driver->card, clk, (uint8_t)event->a, (unsigned)event->b,
+                                              (uint8_t)event->c, event->d ? SIM_HIGH : SIM_LOW),
                          0);
         break;
     case POWER_CYCLE:

@@ -41,7 +41,7 @@ enum action {
     SERVO_INPUTS,  /* levels of the 7I65's digital inputs: a */
     ABSOLUTE, /* in [cycle, to): an absolute encoder of c bits, turning d counts a cycle, at channel b of module a */
     ABSOLUTE_GRAY, /* the same in Gray code */
-    FAULT,         /* fault input of three-phase PWM generator a is at level b */
+    INPUT,         /* input pin c of instance b of module a is at level d */
     POWER_CYCLE,   /* of the card, in this cycle */
 };
 

@@ -4,6 +4,7 @@
 
 #include <hm2/idrom.h>
 
+enum { TPPWM_FAULT = 0x08, INMUX_INPUT = 0x40 }; /* input pins (register map 4.1; lib/sim/sim_inm.c) */
 #define LOCKED 250 /* cycle in which the DPLL has found its phase, whatever the load took */
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
@@ -512,8 +513,35 @@ static const struct wave drives_waves[] = {
 };
 
 static const struct event drives_events[] = {
-    {340, 0, FAULT, 0, 1, 0, 0},
-    {360, 0, FAULT, 0, 0, 0, 0},
+    {340, 0, INPUT, HM2_GTAG_TPPWM, 0, TPPWM_FAULT, 1},
+    {360, 0, INPUT, HM2_GTAG_TPPWM, 0, TPPWM_FAULT, 0},
+};
+
+/* ---- inputs behind multiplexers: levels, filters, slow and fast, a handwheel, settings good and impossible */
+
+#define MUXED(cycle, input, level)                                          \
+    {                                                                       \
+        cycle, 0, INPUT, HM2_GTAG_INMUX, 0, INMUX_INPUT + (input), !(level) \
+    }
+/* Inputs are on when low. A turn of four edges at inputs 0 and 1. */
+#define HANDWHEEL(cycle) MUXED(cycle, 1, 1), MUXED(cycle + 5, 0, 1), MUXED(cycle + 10, 1, 0), MUXED(cycle + 15, 0, 0)
+
+static const struct setting muxed_settings[] = {
+    {0, "watchdog.timeout_ns", 20000000}, {50, "inmux.00.input-05-slow", 1},  {60, "inmux.00.enc0_4xmode", 1},
+    {200, "inmux.00.slow_scans", 100},    {210, "inmux.00.fast_scans", 20},   {220, "inmux.00.scan_rate", 40000},
+    {300, "inmux.00.fast_scans", 100},    {310, "inmux.00.slow_scans", 5000}, {320, "inmux.00.scan_rate", 99999999},
+    {330, "inmux.00.fast_scans", 5},      {330, "inmux.00.slow_scans", 50},   {330, "inmux.00.scan_rate", 20000},
+    {400, "inmux.00.enc0-reset", 1},      {410, "inmux.00.enc0-reset", 0},
+};
+
+static const struct wave muxed_waves[] = {
+    {"led.CR03", WAVE_SQUARE, 0.5, 0.5, 100, 0, 500},
+};
+
+static const struct event muxed_events[] = {
+    MUXED(5, 0, 0),   MUXED(5, 1, 0),    MUXED(20, 3, 1),  MUXED(30, 15, 1), MUXED(60, 5, 1), MUXED(61, 4, 1),
+    MUXED(62, 4, 0),  MUXED(90, 15, 0),  HANDWHEEL(100),   HANDWHEEL(120),   HANDWHEEL(140),  MUXED(230, 5, 0),
+    MUXED(240, 7, 1), MUXED(390, 12, 1), MUXED(360, 5, 1), HANDWHEEL(380),   HANDWHEEL(420),
 };
 
 /* ---- the same for a card with nothing but ports, whose pads are driven, too */
@@ -602,6 +630,8 @@ const struct scenario scenarios[] = {
              .reached = {{"fanuc.00.crc", 0.5}, {"fanuc.00.encoder.count", 1000}, {"fanuc.01.low", 65000}}),
     SCENARIO(drives, "7i93", "num_resolvers=0 num_oneshots=0", 600, .firmware = TEST_DATA "/firmware/drives_29_48.hex",
              .reached = {{"3pwmgen.00.fault", 1}, {"xy2mod.00.posx-fb", 0.009}}),
+    SCENARIO(muxed, "7i93", "", 500, .firmware = TEST_DATA "/firmware/inmux_48.hex",
+             .reached = {{"inmux.00.enc0-count", 5}, {"inmux.00.input-12", 1}, {"inmux.00.scan_width", 16}}),
     SCENARIO(paced, "7i96s", "", 2000, .paced = true, .reached = {{"encoder.00.count", 15000}}),
 };
 const size_t scenario_count = COUNT(scenarios);
