@@ -198,12 +198,13 @@ static struct hm2_serial *open_port(const struct hm2_module *const module, const
 
 void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
-    (void)cycle;
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct hm2_serial *const port = open_port(module, unit);
         if (!port || !port->awaiting)
             continue;
         port->awaiting = false;
+        port->sent_ns = cycle->now_ns;
+        port->now_ns = cycle->received_ns;
         if (!port->resend)
             port->counts.tx_bytes += port->sent_bytes;
         port->ops->take(port);
@@ -212,12 +213,14 @@ void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     }
 }
 
-void serial_late(struct hm2_module *const module, const uint64_t request)
+void serial_late(struct hm2_module *const module, const uint64_t request, const int64_t now_ns)
 {
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct hm2_serial *const port = open_port(module, unit);
-        if (port)
-            port->ops->late(port, request);
+        if (!port)
+            continue;
+        port->now_ns = now_ns;
+        port->ops->late(port, request);
     }
 }
 
@@ -241,11 +244,11 @@ static void miss(struct hm2_serial *const port)
 
 void serial_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
-    (void)cycle;
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct hm2_serial *const port = open_port(module, unit);
         if (!port)
             continue;
+        port->now_ns = cycle->now_ns;
         if (port->awaiting)
             miss(port);
         if (!port->resend)
