@@ -297,6 +297,8 @@ const struct hm2_module_type hm2_pktuart_type = {
     .pack = serial_pack,
     .write_lost = serial_write_lost,
     .late = serial_late,
+    .output_name = serial_output_name,
+    .output_stem = "uart", /* of both kinds */
     .groups = groups,
 };
 

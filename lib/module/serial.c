@@ -184,6 +184,13 @@ int serial_setup_receiver(struct hm2_module *const module, struct hm2_setup *con
     return 0;
 }
 
+const char *serial_output_name(const struct hm2_pd *const pd)
+{
+    static const char *const names[] = {"tx", "tx-drv-en"};
+    const unsigned number = pd->secondary_pin - (HM2_PIN_OUTPUT | 1u);
+    return number < sizeof names / sizeof names[0] ? names[number] : NULL;
+}
+
 struct hm2_serial *serial_port(const struct hm2_module *const module, const unsigned unit)
 {
     struct hm2_serial *const *const ports = module->context;

@@ -100,6 +100,10 @@ struct serial_kind {
 int serial_setup(struct hm2_module *module, struct hm2_setup *setup, const struct serial_kind *kind);
 /* The receiver belongs to the transmitter of its number, which sets both up. */
 int serial_setup_receiver(struct hm2_module *module, struct hm2_setup *setup);
+/* Of the transmitter's pins (hal-interface 2.3, as LinuxCNC 2.9.x has it); an enable that is low while it sends has
+ * none.
+ */
+const char *serial_output_name(const struct hm2_pd *pd);
 /* NULL when there is none. */
 struct hm2_serial *serial_port(const struct hm2_module *module, unsigned unit);
 

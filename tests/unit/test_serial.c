@@ -160,6 +160,25 @@ static void settings_that_the_firmware_cannot_keep_are_refused(void **state)
     sim_bench_free(bench);
 }
 
+static void outputs_have_the_second_names_of_linuxcnc(void **state)
+{
+    static const char *const firmware[] = {"SVUA8_8_72", "PKTUART_0"};
+    static const char *const names[] = {"uart.00.tx", "uart.00.tx-drv-en"};
+    (void)state;
+    for (size_t i = 0; i < sizeof firmware / sizeof firmware[0]; i++) {
+        struct sim_bench *const bench = sim_bench_new("7i80hd-16", firmware[i], "");
+        for (size_t k = 0; k < sizeof names / sizeof names[0]; k++) {
+            char name[64];
+            int err;
+            (void)snprintf(name, sizeof name, "hm2_7i80.0.%s.invert_output", names[k]);
+            (void)hm2_plain_get(bench->plain, name, &err);
+            if (err)
+                fail_msg("%s: there is no %s", firmware[i], name);
+        }
+        sim_bench_free(bench);
+    }
+}
+
 static void a_full_ring_takes_no_more(void **state)
 {
     static const struct loop off = {
@@ -403,6 +422,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_loop_brings_every_byte_back),
         cmocka_unit_test(settings_that_the_firmware_cannot_keep_are_refused),
+        cmocka_unit_test(outputs_have_the_second_names_of_linuxcnc),
         cmocka_unit_test(a_full_ring_takes_no_more),
         cmocka_unit_test(a_thread_that_stalls_costs_a_loop_nothing),
         cmocka_unit_test(what_the_card_cannot_keep_is_counted_and_nothing_wrong_arrives),

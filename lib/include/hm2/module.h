@@ -114,6 +114,7 @@ struct hm2_module_type {
      * parameters ("stepgen.00.step.invert_output", hal-interface 2.3). NULL for a pin that has no such name, e.g. an
      * input; the function itself may be NULL when no pin has one. */
     const char *(*output_name)(const struct hm2_pd *pd);
+    const char *output_stem; /* first part of those names; NULL = name */
     /* Tables of the points, for documentation and tests; the list ends with a row whose prefix is NULL. */
     const struct hm2_point_group *groups;
 };
