@@ -116,10 +116,11 @@ HM2_RARE static void take_late(struct hm2_board *const board)
     count(board->points->late);
     if (request == 0)
         return;
+    const int64_t now_ns = link_now_ns(board->link);
     hm2_plan_swap_late(board->plan);
     for (unsigned i = 0; i < board->module_count; i++)
         if (board->modules[i].type->late)
-            board->modules[i].type->late(&board->modules[i], request);
+            board->modules[i].type->late(&board->modules[i], request, now_ns);
     hm2_plan_swap_late(board->plan);
 }
 
@@ -245,6 +246,7 @@ static void unpack_all(struct hm2_board *const board)
 {
     const bool bitten = hm2_watchdog_bitten(board->watchdog); /* as the cycle before has found */
     struct hm2_cycle *const cycle = board_cycle(board, board->request_ns, bitten);
+    cycle->received_ns = board->received_ns;
     if (board->pipeline.turned)
         date_back(board, cycle);
     call_all(&board->unpacks, cycle);

@@ -125,6 +125,8 @@ static void alias_output(const struct hm2_setup *const setup, const unsigned io)
             all++;
             before += other < io;
         }
+    const struct hm2_module_type *const type = pin->owner->type;
+    const char *const stem = type->output_stem ? type->output_stem : type->name;
     char number[16] = "";
     if (all > 1)
         (void)snprintf(number, sizeof number, "%u.", before);
@@ -132,7 +134,7 @@ static void alias_output(const struct hm2_setup *const setup, const unsigned io)
         const char *const parameter = output_points[i].name + sizeof "###." - 1;
         char existing[HM2_NAME_SIZE], alias[HM2_NAME_SIZE];
         const int existing_len = snprintf(existing, sizeof existing, "%s.gpio.%03u.%s", setup->prefix, io, parameter);
-        const int alias_len = snprintf(alias, sizeof alias, "%s.%s.%02u.%s%s.%s", setup->prefix, pin->owner->type->name,
+        const int alias_len = snprintf(alias, sizeof alias, "%s.%s.%02u.%s%s.%s", setup->prefix, stem,
                                        pin->pd.secondary_unit, number, function, parameter);
         if (existing_len >= (int)sizeof existing || alias_len >= (int)sizeof alias ||
             setup->binder->alias(setup->binder, existing, alias) < 0)

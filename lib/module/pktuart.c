@@ -15,7 +15,6 @@
 #define BLOCKS          6u
 #define WORDS           63u
 #define FRAMES          16u
-#define BUFFER_WORDS    255u /* with one more bit 21 reads as if there were none */
 #define QUEUED_FRAMES   12u
 #define MODE_FRAMES(m)  ((m) >> 16 & 0x1Fu)
 #define MODE_ACTIVE     (1u << 7)
@@ -139,6 +138,7 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
     hm2_section_touch(&p->tx_mode);
     hm2_section_touch(&p->rx_mode);
     p->queued = p->queued_words = 0;
+    pkt_crowd_init(&p->rx.crowd, s->baud);
     pkt_rx_forget(&p->rx, port);
     return 0;
 }
@@ -231,12 +231,20 @@ static bool may_send(const struct pktuart *const p)
     return p->port.settings.drive == HM2_DRIVE_ON && p->queued < QUEUED_FRAMES;
 }
 
+/* What is sent may come back, at once or as an answer of the same length: the receiver has room for it all, however
+ * late the next cycle is. */
+static unsigned words_to_send(const struct pktuart *const p)
+{
+    const unsigned there = p->queued_words + pkt_rx_most_words(&p->rx, p->port.now_ns);
+    const unsigned free_words = there < PKT_BUFFER_WORDS ? PKT_BUFFER_WORDS - there : 0;
+    return free_words < WORDS ? free_words : WORDS;
+}
+
 static void send_frame(struct hm2_serial *const port)
 {
     struct pktuart *const p = (struct pktuart *)port;
     uint8_t bytes[4u * WORDS] = {0};
-    const unsigned free_words = BUFFER_WORDS - p->queued_words;
-    const unsigned most = free_words < WORDS ? free_words : WORDS;
+    const unsigned most = words_to_send(p);
     port->sent_bytes = may_send(p) ? (unsigned)ring_get(&port->tx, bytes, (size_t)4u * most) : 0;
     const unsigned words = sent_words(p);
     queue_aim(&p->out, words);
@@ -289,6 +297,8 @@ const struct hm2_module_type hm2_pktuart_type = {
     .pack = serial_pack,
     .write_lost = serial_write_lost,
     .late = serial_late,
+    .output_name = serial_output_name,
+    .output_stem = "uart", /* of both kinds */
     .groups = groups,
 };
 

@@ -140,6 +140,14 @@ static bool did_not_arrive(const struct pkt_hunt *const hunt)
     return hunt->losses == 1 && hunt->lost_sizes == 0 && hunt->surplus > -(int)hunt->lost_words;
 }
 
+/* Of the buffer, at most: words that are held were taken from it, whichever frames they belong to. */
+static unsigned hunt_words(const struct pkt_rx *const rx, const int64_t now_ns)
+{
+    const unsigned known =
+        rx->hunt.known_words > rx->hunt.taken_words ? rx->hunt.known_words - rx->hunt.taken_words : 0;
+    return known + pkt_crowd_words(&rx->crowd, now_ns);
+}
+
 static void hold_word(struct pkt_hunt *const hunt, const uint32_t word)
 {
     if (hunt->held < PKT_RX_HOLD_WORDS)
@@ -206,20 +214,57 @@ static void learn(struct pkt_rx *const rx, struct hm2_serial *const port, const 
     release(rx, port, 0, hunt->held);
 }
 
+/* ---- a buffer that may have run over ------------------------------------------------------------------------------
+ */
+
+unsigned pkt_rx_most_words(const struct pkt_rx *const rx, const int64_t now_ns)
+{
+    return frame_words(rx) + pkt_crowd_words(&rx->crowd, now_ns);
+}
+
+static void begin_doubt(struct pkt_rx *const rx, const int64_t now_ns)
+{
+    rx->doubt = (struct pkt_doubt){.on = true,
+                                   .awaited = rx->asked_counts + MODE_FRAMES(rx->mode) + 1u,
+                                   .most_bytes = WORD_BYTES * pkt_crowd_words(&rx->crowd, now_ns),
+                                   .known_bytes = frame_bytes(rx)};
+    rx->hunt.held = 0;
+}
+
+/* A frame that was longer than its size can tell shows as a shorter one: so many bytes may be missing. */
+static unsigned untold_bytes(const struct pkt_rx *const rx)
+{
+    const unsigned told = frame_bytes(rx) - rx->doubt.known_bytes;
+    return told > 0 && rx->doubt.most_bytes > told ? (rx->doubt.most_bytes - told) & ~(PKT_FRAME_MODULUS - 1u) : 0;
+}
+
+static enum pkt_rx_health decide(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    if (rx->doubt.awaited > 0 && !rx->still)
+        return PKT_RX_GOOD;
+    if (frame_words(rx) > PKT_BUFFER_WORDS)
+        return PKT_RX_OVERRUN;
+    port->counts.rx_uncertain += untold_bytes(rx);
+    rx->doubt.on = false;
+    release(rx, port, 0, rx->hunt.held);
+    return PKT_RX_GOOD;
+}
+
 void pkt_rx_forget(struct pkt_rx *const rx, struct hm2_serial *const port)
 {
     if (rx->hunt.on)
         give_up(rx, port);
     else
         port->counts.rx_uncertain += frame_bytes(rx);
-    rx->hunt.on = rx->unanswered = rx->skips = false;
+    rx->hunt.on = rx->unanswered = rx->skips = rx->doubt.on = false;
     rx->frames = rx->asked_words = rx->asked_counts = 0;
 }
 
 void pkt_rx_clear(struct pkt_rx *const rx, struct hm2_serial *const port)
 {
+    const unsigned most = WORD_BYTES * pkt_crowd_words(&rx->crowd, port->now_ns);
     pkt_rx_forget(rx, port);
-    port->counts.rx_uncertain += CLEAR_BYTES;
+    port->counts.rx_uncertain += most > CLEAR_BYTES ? most : CLEAR_BYTES;
     rx->clearing = rx->skips = true;
 }
 
@@ -231,7 +276,7 @@ static void take_words(struct pkt_rx *const rx, struct hm2_serial *const port)
     for (unsigned n = 0; n < rx->asked_words; n++) {
         const struct queue_place at = queue_place(&rx->data, rx->asked_words, n);
         const uint32_t word = hm2_window_get(at.window, at.word);
-        if (rx->hunt.on)
+        if (rx->hunt.on || rx->doubt.on)
             hold_word(&rx->hunt, word);
         else
             deliver(rx, port, word);
@@ -252,6 +297,7 @@ static void take_sizes(struct pkt_rx *const rx, struct hm2_serial *const port)
         rx->hunt.known_words += words_of(count & SIZE_MASK);
         rx->hunt.known_bytes += count & SIZE_MASK;
     }
+    rx->doubt.awaited -= smaller(rx->doubt.awaited, rx->asked_counts);
     rx->asked_counts = 0;
 }
 
@@ -263,36 +309,57 @@ static void take_state(struct pkt_rx *const rx)
     rx->still = !((before | rx->mode) & MODE_ACTIVE) && MODE_FRAMES(before) == 0 && MODE_FRAMES(rx->mode) == 0;
 }
 
+static void look_at_crowd(struct pkt_rx *const rx, const struct hm2_serial *const port, const unsigned sizes)
+{
+    const struct pkt_sight sight = {.sent_ns = port->sent_ns,
+                                    .received_ns = port->now_ns,
+                                    .taken = sizes,
+                                    .frames = MODE_FRAMES(rx->mode),
+                                    .still = rx->still};
+    pkt_crowd_see(&rx->crowd, &sight);
+}
+
 static void take_all(struct pkt_rx *const rx, struct hm2_serial *const port)
 {
+    const unsigned sizes = rx->asked_counts;
     take_state(rx);
+    if (!rx->hunt.on && !rx->doubt.on && pkt_rx_most_words(rx, port->now_ns) > PKT_BUFFER_WORDS)
+        begin_doubt(rx, port->now_ns);
     take_words(rx, port);
     take_sizes(rx, port);
+    look_at_crowd(rx, port, sizes);
 }
 
 enum pkt_rx_health pkt_rx_take(struct pkt_rx *const rx, struct hm2_serial *const port)
 {
+    if (rx->unanswered && rx->doubt.on)
+        return PKT_RX_LOST;
     if (rx->unanswered)
         lose(rx);
     if (rx->clearing) {
         take_state(rx);
+        look_at_crowd(rx, port, 0);
         return PKT_RX_GOOD;
     }
     rx->hunt.vain++;
+    const bool crowded = rx->hunt.on && hunt_words(rx, port->now_ns) > PKT_BUFFER_WORDS;
     take_all(rx, port);
     const bool data = (rx->mode & MODE_DATA) != 0;
     if (rx->hunt.on && rx->still)
         learn(rx, port, data);
     const bool left_over = !rx->hunt.on && rx->still && rx->frames == 0 && data;
-    if (left_over || (rx->mode & MODE_ERROR) != 0)
+    if (left_over || (rx->mode & MODE_ERROR) != 0 || pkt_crowd_is_endless(&rx->crowd))
         return PKT_RX_OVERRUN;
-    return rx->hunt.on && is_hopeless(rx) ? PKT_RX_LOST : PKT_RX_GOOD;
+    if (rx->doubt.on)
+        return decide(rx, port);
+    return rx->hunt.on && (crowded || is_hopeless(rx)) ? PKT_RX_LOST : PKT_RX_GOOD;
 }
 
 void pkt_rx_late(struct pkt_rx *const rx, struct hm2_serial *const port, const uint64_t request)
 {
     if (rx->clearing || rx->request != request || (rx->asked_words == 0 && rx->asked_counts == 0))
         return;
+    port->sent_ns = rx->request_ns;
     take_all(rx, port);
     rx->unanswered = false;
 }
@@ -308,6 +375,8 @@ void pkt_rx_miss(struct pkt_rx *const rx)
 /* Words that are there for certain. A pop beyond them may spoil the card's buffer. */
 static unsigned words_there(const struct pkt_rx *const rx)
 {
+    if (rx->doubt.on)
+        return 0;
     if (!rx->hunt.on)
         return frame_words(rx);
     const int there = rx->hunt.surplus - taken_beyond(&rx->hunt);
@@ -335,6 +404,7 @@ void pkt_rx_ask(struct pkt_rx *const rx, const struct hm2_serial *const port, co
             words = 0;
         rx->words_next = counts > 0;
         rx->request = hm2_plan_requests(port->plan) + 1u;
+        rx->request_ns = port->now_ns;
         rx->asked_words = words;
         rx->asked_counts = counts;
     }

@@ -3,6 +3,7 @@
 #ifndef HM2_MODULE_PKTUART_RX_H
 #define HM2_MODULE_PKTUART_RX_H
 
+#include "pktuart_crowd.h"
 #include "serial.h"
 
 #define PKT_RX_FRAMES     64u
@@ -25,6 +26,15 @@ struct pkt_hunt {
     uint32_t hold[PKT_RX_HOLD_WORDS];
 };
 
+/* More words than the buffer holds can have come. Those at hand are held, and no more asked for, until the sizes show
+ * how many there were. */
+struct pkt_doubt {
+    bool on;
+    unsigned awaited;    /* sizes that decide */
+    unsigned most_bytes; /* that came with frames of unknown size */
+    unsigned known_bytes;
+};
+
 struct pkt_rx {
     struct queue data, counts;
     struct hm2_window state;
@@ -34,12 +44,15 @@ struct pkt_rx {
     bool skips; /* the oldest frame is the first after a clear: its beginning may be missing */
     unsigned asked_words, asked_counts;
     uint64_t request; /* in which they were asked for */
-    bool unanswered;  /* it was given up: nothing more is asked for until its reply is late or a later one shows that it
-                       * is lost */
+    int64_t request_ns;
+    bool unanswered; /* it was given up: nothing more is asked for until its reply is late or a later one shows that it
+                      * is lost */
     bool words_next;
     unsigned first, frames; /* whose size is known, oldest first; a ring */
     uint16_t size[PKT_RX_FRAMES];
     struct pkt_hunt hunt;
+    struct pkt_crowd crowd;
+    struct pkt_doubt doubt;
 };
 
 int pkt_rx_add(struct pkt_rx *rx, const struct hm2_serial *port, struct hm2_diag *diag);
@@ -53,6 +66,8 @@ enum pkt_rx_health { PKT_RX_GOOD, PKT_RX_LOST, PKT_RX_OVERRUN };
 /* A reply. Unless it is good the receiver must be cleared: sizes and words do not belong together for certain. */
 enum pkt_rx_health pkt_rx_take(struct pkt_rx *rx, struct hm2_serial *port);
 void pkt_rx_late(struct pkt_rx *rx, struct hm2_serial *port, uint64_t request);
+/* Words that the card's buffer may hold now, at most. */
+unsigned pkt_rx_most_words(const struct pkt_rx *rx, int64_t now_ns);
 void pkt_rx_ask(struct pkt_rx *rx, const struct hm2_serial *port, bool ready);
 
 #endif

@@ -184,6 +184,13 @@ int serial_setup_receiver(struct hm2_module *const module, struct hm2_setup *con
     return 0;
 }
 
+const char *serial_output_name(const struct hm2_pd *const pd)
+{
+    static const char *const names[] = {"tx", "tx-drv-en"};
+    const unsigned number = pd->secondary_pin - (HM2_PIN_OUTPUT | 1u);
+    return number < sizeof names / sizeof names[0] ? names[number] : NULL;
+}
+
 struct hm2_serial *serial_port(const struct hm2_module *const module, const unsigned unit)
 {
     struct hm2_serial *const *const ports = module->context;
@@ -198,12 +205,13 @@ static struct hm2_serial *open_port(const struct hm2_module *const module, const
 
 void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
-    (void)cycle;
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct hm2_serial *const port = open_port(module, unit);
         if (!port || !port->awaiting)
             continue;
         port->awaiting = false;
+        port->sent_ns = cycle->now_ns;
+        port->now_ns = cycle->received_ns;
         if (!port->resend)
             port->counts.tx_bytes += port->sent_bytes;
         port->ops->take(port);
@@ -212,12 +220,14 @@ void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     }
 }
 
-void serial_late(struct hm2_module *const module, const uint64_t request)
+void serial_late(struct hm2_module *const module, const uint64_t request, const int64_t now_ns)
 {
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct hm2_serial *const port = open_port(module, unit);
-        if (port)
-            port->ops->late(port, request);
+        if (!port)
+            continue;
+        port->now_ns = now_ns;
+        port->ops->late(port, request);
     }
 }
 
@@ -241,11 +251,11 @@ static void miss(struct hm2_serial *const port)
 
 void serial_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
-    (void)cycle;
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct hm2_serial *const port = open_port(module, unit);
         if (!port)
             continue;
+        port->now_ns = cycle->now_ns;
         if (port->awaiting)
             miss(port);
         if (!port->resend)

@@ -61,9 +61,10 @@ struct hm2_serial {
     double clock_hz;
     uint16_t tx_reg[SERIAL_REGISTERS], rx_reg[SERIAL_REGISTERS];
     bool open;
-    bool awaiting;       /* a write and a request with our words are on their way */
-    bool resend;         /* the last write was lost: the same again */
-    unsigned sent_bytes; /* in the last write, until it is known to have arrived */
+    bool awaiting;           /* a write and a request with our words are on their way */
+    bool resend;             /* the last write was lost: the same again */
+    unsigned sent_bytes;     /* in the last write, until it is known to have arrived */
+    int64_t sent_ns, now_ns; /* take: of the request, and of its reply; late and ask: now */
     struct hm2_serial_settings settings;
     struct ring tx, rx;
     struct hm2_serial_counts counts;
@@ -99,12 +100,16 @@ struct serial_kind {
 int serial_setup(struct hm2_module *module, struct hm2_setup *setup, const struct serial_kind *kind);
 /* The receiver belongs to the transmitter of its number, which sets both up. */
 int serial_setup_receiver(struct hm2_module *module, struct hm2_setup *setup);
+/* Of the transmitter's pins (hal-interface 2.3, as LinuxCNC 2.9.x has it); an enable that is low while it sends has
+ * none.
+ */
+const char *serial_output_name(const struct hm2_pd *pd);
 /* NULL when there is none. */
 struct hm2_serial *serial_port(const struct hm2_module *module, unsigned unit);
 
 void serial_unpack(struct hm2_module *module, const struct hm2_cycle *cycle);
 void serial_pack(struct hm2_module *module, const struct hm2_cycle *cycle);
 void serial_write_lost(struct hm2_module *module);
-void serial_late(struct hm2_module *module, uint64_t request);
+void serial_late(struct hm2_module *module, uint64_t request, int64_t now_ns);
 
 #endif

@@ -262,6 +262,7 @@ const struct hm2_module_type hm2_uart_type = {
     .pack = serial_pack,
     .write_lost = serial_write_lost,
     .late = serial_late,
+    .output_name = serial_output_name,
     .groups = groups,
 };
 

@@ -17,6 +17,8 @@ struct loop {
     unsigned burst, every; /* bytes that the world outside sends at once, every so many periods */
 };
 
+#define STALL_EVERY 50u /* cycles from one stall of the thread to the next */
+
 struct peer {
     struct sim_bench *bench;
     uint8_t gtag;
@@ -55,20 +57,29 @@ static size_t bytes_of(const struct loop *loop)
     return wanted ? strtoul(wanted, NULL, 10) : loop->bytes;
 }
 
-static size_t run_loop(const struct loop *loop, const size_t total, struct hm2_serial_counts *counts)
+static void stall(struct sim_bench *bench, const unsigned periods)
+{
+    bench->now_ns += (int64_t)periods * BENCH_PERIOD_NS;
+    sim_net_sleep_until(bench->net, bench->now_ns);
+}
+
+static size_t run_loop(const struct loop *loop, const size_t total, const unsigned stall_periods,
+                       struct hm2_serial_counts *counts)
 {
     struct sim_bench *const bench = sim_bench_new("7i80hd-16", loop->firmware, "");
     struct hm2_serial *const port = open_port(bench, loop);
     struct peer peer = {bench, loop->gtag};
     size_t put = 0, got = 0, idle = 0;
     assert_int_equal(sim_card_serial(bench->card, loop->gtag, 0, echo, &peer), 0);
-    while (got < total && idle < 200) {
+    for (unsigned cycle = 1; got < total && idle < 200; cycle++) {
         uint8_t bytes[512];
         size_t n = 0;
         for (; n < sizeof bytes && put + n < total; n++)
             bytes[n] = pattern(put + n);
         put += hm2_serial_put(port, bytes, n);
         sim_bench_cycle(bench);
+        if (cycle % STALL_EVERY == 0)
+            stall(bench, stall_periods);
         n = hm2_serial_get(port, bytes, sizeof bytes);
         idle = n ? 0 : idle + 1;
         for (size_t i = 0; i < n; i++, got++)
@@ -92,8 +103,35 @@ static void a_loop_brings_every_byte_back(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct hm2_serial_counts counts;
-        const size_t total = bytes_of(&rows[i]), got = run_loop(&rows[i], total, &counts);
+        const size_t total = bytes_of(&rows[i]), got = run_loop(&rows[i], total, 0, &counts);
         if (got != total || counts.rx_errors || counts.rx_overruns || counts.rx_uncertain)
+            fail_msg("row %zu: %zu of %zu bytes, errors %u, overruns %u, uncertain %u, sent %u", i, got, total,
+                     counts.rx_errors, counts.rx_overruns, counts.rx_uncertain, counts.tx_bytes);
+    }
+}
+
+/* What the card still sends while the thread stalls comes back into its receiver, which tells nobody when it is full:
+ * no more is sent than it can keep. */
+static void a_thread_that_stalls_costs_a_loop_nothing(void **state)
+{
+    static const struct {
+        struct loop loop;
+        unsigned periods;
+    } rows[] = {
+        {{"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 20000, 0, 1},
+         5},
+        {{"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 20000, 0, 1},
+         40},
+        {{"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 20000, 0, 1},
+         11},
+        {{"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_ON, 5000, 0, 1},
+         200},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct hm2_serial_counts counts;
+        const size_t total = rows[i].loop.bytes, got = run_loop(&rows[i].loop, total, rows[i].periods, &counts);
+        if (got != total || counts.rx_errors || counts.rx_overruns)
             fail_msg("row %zu: %zu of %zu bytes, errors %u, overruns %u, uncertain %u, sent %u", i, got, total,
                      counts.rx_errors, counts.rx_overruns, counts.rx_uncertain, counts.tx_bytes);
     }
@@ -122,6 +160,25 @@ static void settings_that_the_firmware_cannot_keep_are_refused(void **state)
     sim_bench_free(bench);
 }
 
+static void outputs_have_the_second_names_of_linuxcnc(void **state)
+{
+    static const char *const firmware[] = {"SVUA8_8_72", "PKTUART_0"};
+    static const char *const names[] = {"uart.00.tx", "uart.00.tx-drv-en"};
+    (void)state;
+    for (size_t i = 0; i < sizeof firmware / sizeof firmware[0]; i++) {
+        struct sim_bench *const bench = sim_bench_new("7i80hd-16", firmware[i], "");
+        for (size_t k = 0; k < sizeof names / sizeof names[0]; k++) {
+            char name[64];
+            int err;
+            (void)snprintf(name, sizeof name, "hm2_7i80.0.%s.invert_output", names[k]);
+            (void)hm2_plain_get(bench->plain, name, &err);
+            if (err)
+                fail_msg("%s: there is no %s", firmware[i], name);
+        }
+        sim_bench_free(bench);
+    }
+}
+
 static void a_full_ring_takes_no_more(void **state)
 {
     static const struct loop off = {
@@ -145,7 +202,8 @@ struct weather {
     struct sim_bench *bench;
     const struct loop *loop;
     unsigned cycle;
-    bool loses, loses_requests;
+    bool calm, loses, loses_requests;
+    unsigned stall_periods;
     size_t put;
 };
 
@@ -179,6 +237,24 @@ static bool send_burst(struct weather *w)
     return sent;
 }
 
+static void end_period(struct weather *w)
+{
+    w->bench->now_ns += BENCH_PERIOD_NS;
+    sim_net_sleep_until(w->bench->net, w->bench->now_ns);
+}
+
+/* The thread is kept from its work, the world outside goes on. */
+static bool stand_still(struct weather *w)
+{
+    bool sent = false;
+    for (unsigned i = 0; i < w->stall_periods; i++) {
+        w->cycle++;
+        sent = send_burst(w) || sent;
+        end_period(w);
+    }
+    return sent;
+}
+
 static bool cycle_in(struct weather *w)
 {
     static const struct sim_faults calm = {.seed = 1}, gale = {.seed = 1, .loss = 1.0};
@@ -189,9 +265,10 @@ static bool cycle_in(struct weather *w)
     hm2_board_read(bench->board, BENCH_PERIOD_NS);
     assert_int_equal(sim_net_set_faults(bench->net, &calm), 0);
     hm2_board_write(bench->board, BENCH_PERIOD_NS);
-    const bool sent = send_burst(w);
-    bench->now_ns += BENCH_PERIOD_NS;
-    sim_net_sleep_until(bench->net, bench->now_ns);
+    bool sent = send_burst(w);
+    end_period(w);
+    if (w->cycle % 100 == 0)
+        sent = stand_still(w) || sent;
     assert_int_equal(sim_net_set_faults(bench->net, &calm), 0);
     return sent;
 }
@@ -209,16 +286,19 @@ struct outcome {
     struct hm2_serial_counts counts;
 };
 
-static struct outcome receive_in(const struct loop *loop, const bool loses, const bool loses_requests)
+static struct outcome receive_in(const struct loop *loop, const struct weather *weather)
 {
     struct sim_bench *const bench = sim_bench_new("7i80hd-16", loop->firmware, "");
     struct hm2_serial *const port = open_port(bench, loop);
-    struct weather w = {.bench = bench, .loop = loop, .loses = loses, .loses_requests = loses_requests};
+    struct weather w = *weather;
+    w.bench = bench;
+    w.loop = loop;
     assert_int_equal(sim_card_serial(bench->card, loop->gtag, 0, ignore, NULL), 0);
     struct outcome out = {0};
     for (unsigned i = 0; i < 20; i++)
         sim_bench_cycle(bench);
-    sim_net_on_taken(bench->net, blow, &w);
+    if (!w.calm)
+        sim_net_on_taken(bench->net, blow, &w);
     for (unsigned idle = 0; idle < 150; idle++) {
         uint8_t bytes[512];
         if (cycle_in(&w))
@@ -250,7 +330,7 @@ static void late_replies_cost_no_byte(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof stormy / sizeof stormy[0]; i++) {
-        const struct outcome out = receive_in(&stormy[i], false, false);
+        const struct outcome out = receive_in(&stormy[i], &(struct weather){0});
         if (out.got != stormy[i].bytes || out.end != stormy[i].bytes || out.counts.rx_uncertain ||
             out.counts.rx_overruns)
             fail_msg("row %zu: %zu bytes, end %zu, uncertain %u, overruns %u", i, out.got, out.end,
@@ -262,7 +342,7 @@ static void lost_replies_are_counted_and_what_arrives_is_in_order(void **state)
 {
     (void)state;
     for (size_t i = 0; i < sizeof stormy / sizeof stormy[0]; i++) {
-        const struct outcome out = receive_in(&stormy[i], true, false);
+        const struct outcome out = receive_in(&stormy[i], &(struct weather){.loses = true});
         const size_t missing = stormy[i].bytes - out.got;
         if (out.lost_replies == 0 || missing == 0 || out.end > stormy[i].bytes || out.jumps > out.lost_replies ||
             missing > out.counts.rx_uncertain || out.counts.rx_overruns > 0)
@@ -282,11 +362,58 @@ static void a_lost_request_costs_a_packet_uart_that_rests_nothing(void **state)
     for (size_t i = 0; i < sizeof stormy / sizeof stormy[0]; i++) {
         if (stormy[i].every == 1)
             continue;
-        const struct outcome out = receive_in(&stormy[i], false, true);
+        const struct outcome out = receive_in(&stormy[i], &(struct weather){.loses_requests = true});
         if (out.lost_requests == 0 || out.got != stormy[i].bytes || out.jumps || out.counts.rx_uncertain ||
             out.counts.rx_overruns)
             fail_msg("row %zu: %zu bytes, jumps %u, uncertain %u, overruns %u, requests lost %u", i, out.got, out.jumps,
                      out.counts.rx_uncertain, out.counts.rx_overruns, (unsigned)out.lost_requests);
+    }
+}
+
+/* ---- more than the card can keep --------------------------------------------------------------------------------- */
+
+/* A frame of more than 1023 bytes has a size that is too small, and words that do not read are overwritten: the
+ * firmware tells neither. */
+static void what_the_card_cannot_keep_is_counted_and_nothing_wrong_arrives(void **state)
+{
+    static const struct {
+        struct loop loop;
+        unsigned stall_periods;
+    } rows[] = {
+        {{"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 30000, 77, 1},
+         12},
+        {{"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 30000, 77, 1},
+         40},
+        {{"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 9000, 3000, 80},
+         0},
+        {{"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 4400, 1100, 40},
+         0},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const struct outcome out =
+            receive_in(&rows[i].loop, &(struct weather){.calm = true, .stall_periods = rows[i].stall_periods});
+        const size_t missing = rows[i].loop.bytes - out.got;
+        if (missing == 0 || out.end > rows[i].loop.bytes || out.jumps > out.counts.rx_overruns ||
+            missing > out.counts.rx_uncertain || out.counts.rx_overruns == 0)
+            fail_msg("row %zu: %zu bytes, end %zu, jumps %u, uncertain %u, overruns %u", i, out.got, out.end, out.jumps,
+                     out.counts.rx_uncertain, out.counts.rx_overruns);
+    }
+}
+
+/* The same stalls with short messages, as from a device that is asked: all there. */
+static void a_thread_that_stalls_costs_short_messages_nothing(void **state)
+{
+    static const struct loop rows[] = {
+        {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 3000, 100, 12},
+        {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_PARITY_NONE, HM2_DRIVE_ON, 3000, 60, 12},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const struct outcome out = receive_in(&rows[i], &(struct weather){.calm = true, .stall_periods = 40});
+        if (out.got != rows[i].bytes || out.jumps || out.counts.rx_overruns)
+            fail_msg("row %zu: %zu bytes, jumps %u, uncertain %u, overruns %u", i, out.got, out.jumps,
+                     out.counts.rx_uncertain, out.counts.rx_overruns);
     }
 }
 
@@ -295,7 +422,11 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_loop_brings_every_byte_back),
         cmocka_unit_test(settings_that_the_firmware_cannot_keep_are_refused),
+        cmocka_unit_test(outputs_have_the_second_names_of_linuxcnc),
         cmocka_unit_test(a_full_ring_takes_no_more),
+        cmocka_unit_test(a_thread_that_stalls_costs_a_loop_nothing),
+        cmocka_unit_test(what_the_card_cannot_keep_is_counted_and_nothing_wrong_arrives),
+        cmocka_unit_test(a_thread_that_stalls_costs_short_messages_nothing),
         cmocka_unit_test(late_replies_cost_no_byte),
         cmocka_unit_test(a_lost_request_costs_a_packet_uart_that_rests_nothing),
         cmocka_unit_test(lost_replies_are_counted_and_what_arrives_is_in_order),

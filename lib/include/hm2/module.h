@@ -24,8 +24,9 @@
 
 /* Facts of the present cycle, the same for every module of a card. */
 struct hm2_cycle {
-    int64_t now_ns;    /* link's clock, when the inputs were asked for (unpack) or the write is packed (pack) */
-    int64_t period_ns; /* of the thread, > 0 */
+    int64_t now_ns;      /* link's clock, when the inputs were asked for (unpack) or the write is packed (pack) */
+    int64_t received_ns; /* unpack: when the reply was here */
+    int64_t period_ns;   /* of the thread, > 0 */
     double period_s;
     double age_s;    /* unpack: what the inputs are older than this cycle; 0 unless pipelined */
     uint32_t writes; /* write cycles since load or since the last restart; 0 = this is the first */
@@ -106,13 +107,14 @@ struct hm2_module_type {
     /* After the reply was judged fresh but before unpack, a write had been lost: modules with self-clearing bits
      * learn here that what they sent did not arrive. Most need nothing (sections are resent). May be NULL. */
     void (*write_lost)(struct hm2_module *module);
-    /* A reply to the request of this number (hm2_plan_requests()) has come after it was given up; while this runs, the
-     * windows show it. For FIFOs, whose words come only once: anything else in it is out of date. May be NULL. */
-    void (*late)(struct hm2_module *module, uint64_t request);
+    /* A reply to the request of this number (hm2_plan_requests()) has come after it was given up, now; while this runs,
+     * the windows show it. For FIFOs, whose words come only once: anything else in it is out of date. May be NULL. */
+    void (*late)(struct hm2_module *module, uint64_t request, int64_t now_ns);
     /* HAL name of an output pin of this module ("step"), from which a port makes the second names of the pin's
      * parameters ("stepgen.00.step.invert_output", hal-interface 2.3). NULL for a pin that has no such name, e.g. an
      * input; the function itself may be NULL when no pin has one. */
     const char *(*output_name)(const struct hm2_pd *pd);
+    const char *output_stem; /* first part of those names; NULL = name */
     /* Tables of the points, for documentation and tests; the list ends with a row whose prefix is NULL. */
     const struct hm2_point_group *groups;
 };

@@ -34,9 +34,15 @@ struct hm2_serial_settings {
 
 /*
  * What was lost, and why. What arrives is in order always, and bytes received + rx_uncertain are never fewer than were
- * sent to the port, unless the card's buffers ran over. For a PktUART on a line that rests for some periods they are as
+ * sent to the port, unless a UART's buffer ran over. For a PktUART on a line that rests for some periods they are as
  * many, but that the last word of a frame whose size was lost counts as four bytes; without such a rest the receiver is
- * cleared, which counts as 2047 bytes.
+ * cleared, which counts as 2047 bytes or more.
+ *
+ * A PktUART keeps 1020 bytes until the next cycles: 10 ms at 1 Mbaud without a pause, 88 ms at 115200. Its firmware
+ * does not tell when more came, nor that a frame had more than 1023 bytes, so the driver goes by the time: when a cycle
+ * comes later than that, what arrived is used if the frames' sizes show that it fitted, and the bytes that a frame of
+ * more than 1023 can have had besides, in that time, count as uncertain; if it did not fit the receiver is cleared. No
+ * more is sent than the receiver could keep if it came back, so a loop loses nothing however late a cycle is.
  */
 struct hm2_serial_counts {
     uint32_t rx_bytes, tx_bytes;
