@@ -178,6 +178,7 @@ int flash_card_new(struct flash_card **const card, struct link *const link, stru
     flash_port_init(&made->port, link);
     made->port.counters.bytes_per_read = FLASH_READ_MOST;
     made->port.counters.pages_per_write = 1;
+    made->port.counters.requests_ahead = 2; /* to begin with */
     const int err = flash_identify(made, diag);
     if (err < 0)
         free(made);

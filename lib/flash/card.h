@@ -10,6 +10,8 @@
 #define FLASH_READ_MOST  1424u
 #define FLASH_READ_LEAST 256u
 #define FLASH_PAGES_MOST 5u
+#define FLASH_AHEAD_MOST 4u /* requests to read that are on their way at once: flash tool reference 4.4 */
+#define FLASH_BATCH_READ (FLASH_BATCH_MOST * FLASH_READ_MOST)
 
 struct flash_card {
     struct flash_port port;
@@ -34,5 +36,9 @@ int HM2_MUST_CHECK flash_program(struct flash_card *card, uint32_t address, cons
 /* One datagram's worth of reading; *count is cut to what came. */
 int HM2_MUST_CHECK flash_read_some(struct flash_card *card, uint32_t address, uint8_t *bytes, size_t *count,
                                    struct hm2_diag *diag);
+
+/* The same with several datagrams at once, as long as none is lost: then one at a time for ever after. */
+int HM2_MUST_CHECK flash_read_ahead(struct flash_card *card, uint32_t address, uint8_t *bytes, size_t *count,
+                                    struct hm2_diag *diag);
 
 #endif

@@ -179,6 +179,66 @@ int flash_read_some(struct flash_card *const card, const uint32_t address, uint8
     return 0;
 }
 
+/* The next request of a batch that reads so many bytes altogether. */
+static int send_part(struct flash_card *const card, struct flash_batch *const batch, const uint32_t address,
+                     const size_t count, size_t *const data_at)
+{
+    struct flash_port *const port = &card->port;
+    const size_t most = port->counters.bytes_per_read, done = batch->sent * most;
+    flash_port_begin(port);
+    add_address(&port->builder, address + (uint32_t)done);
+    add_data_read(&port->builder, (count - done < most ? count - done : most) + (WORD_BYTES - 1), data_at);
+    return flash_batch_send(port, batch);
+}
+
+/* Whole batch, or what of it came before the first gap. */
+static size_t read_batch(struct flash_card *const card, const uint32_t address, uint8_t *const bytes,
+                         const size_t count)
+{
+    struct flash_port *const port = &card->port;
+    const size_t most = port->counters.bytes_per_read;
+    const unsigned parts = (unsigned)((count + most - 1) / most);
+    struct flash_batch batch;
+    size_t data_at = 0; /* the same in all answers */
+    int which = 0;
+    flash_batch_begin(port, &batch);
+    while (batch.answered < parts && which >= 0) {
+        while (batch.sent < parts && batch.sent - batch.answered < port->counters.requests_ahead && which >= 0)
+            which = send_part(card, &batch, address, count, &data_at);
+        if (which >= 0)
+            which = flash_batch_receive(port, &batch);
+        if (which < 0)
+            break;
+        const size_t at = (unsigned)which * most;
+        memcpy(bytes + at, port->reply + data_at, count - at < most ? count - at : most);
+    }
+    flash_batch_end(port, &batch);
+    unsigned whole = 0;
+    while (whole < parts && batch.part[whole].answered)
+        whole++;
+    return whole == parts ? count : whole * most;
+}
+
+int flash_read_ahead(struct flash_card *const card, const uint32_t address, uint8_t *const bytes, size_t *const count,
+                     struct hm2_diag *const diag)
+{
+    struct flash_counters *const counters = &card->port.counters;
+    const size_t most = (size_t)FLASH_BATCH_MOST * counters->bytes_per_read;
+    const size_t wanted = *count < most ? *count : most;
+    if (counters->requests_ahead <= 1 || wanted <= counters->bytes_per_read)
+        return flash_read_some(card, address, bytes, count, diag);
+    const size_t got = read_batch(card, address, bytes, wanted);
+    if (got < wanted)
+        counters->requests_ahead = 1;
+    else if (counters->requests_ahead < FLASH_AHEAD_MOST)
+        counters->requests_ahead++;
+    if (got == 0)
+        return flash_read_some(card, address, bytes, count, diag);
+    counters->bytes_read += got;
+    *count = got;
+    return 0;
+}
+
 int flash_card_read(struct flash_card *const card, uint32_t address, uint8_t *bytes, size_t count,
                     struct hm2_diag *const diag)
 {

@@ -53,11 +53,21 @@ void job_enter(struct flash_job *const job, const enum job_state state)
         job->progress.total = job->plan.pages;
 }
 
+/* The rest of a key that was put off is compared behind the other sectors. */
+static uint32_t done_of_pass(const struct flash_job *const job)
+{
+    if (job->key_rest == 0)
+        return job->cursor;
+    const uint32_t bytes = job->passes[job->pass].bytes;
+    return job_in_key_rest(job) ? bytes - (FLASH_SECTOR_BYTES - job->cursor)
+                                : job->cursor - (FLASH_SECTOR_BYTES - job->key_rest);
+}
+
 struct flash_progress flash_job_progress(const struct flash_job *const job)
 {
     struct flash_progress progress = job->progress;
     if (job->state == JOB_COMPARE || job->state == JOB_RECHECK || job->state == JOB_READ) {
-        uint32_t done = job->cursor, total = 0;
+        uint32_t done = done_of_pass(job), total = 0;
         for (unsigned i = 0; i < job->pass_count; i++) {
             total += job->passes[i].bytes;
             done += i < job->pass ? job->passes[i].bytes : 0;
@@ -373,7 +383,7 @@ static int read_on(struct flash_job *const job, struct hm2_diag *const diag)
 {
     const uint32_t total = job->passes[0].bytes;
     size_t len = total - job->cursor;
-    const int err = flash_read_some(job->card, job->cursor, job->dump + job->cursor, &len, diag);
+    const int err = flash_read_ahead(job->card, job->cursor, job->dump + job->cursor, &len, diag);
     if (err < 0)
         return err;
     job->progress.address = job->cursor;

@@ -40,9 +40,11 @@ struct flash_job {
 
     struct job_pass passes[MAX_PASSES];
     unsigned pass_count, pass;
-    uint32_t cursor; /* of the pass: next byte to compare or to read */
-    unsigned sector; /* being written, counted in the chip */
-    bool in_sector;  /* some of its pages are written and some are not */
+    uint32_t cursor;   /* of the pass: next byte to compare or to read */
+    size_t alike;      /* bytes in a row that were found to be right */
+    uint32_t key_rest; /* from where on the key is compared, once the other sectors are; 0 = not put off */
+    unsigned sector;   /* being written, counted in the chip */
+    bool in_sector;    /* some of its pages are written and some are not */
 
     uint8_t cost[FLASH_MAX_SECTORS]; /* of the attempts that failed */
     uint8_t todo[MAX_PAGES / 8];     /* pages of the chip that must be written */
@@ -58,7 +60,7 @@ struct flash_job {
     struct flash_progress progress;
     uint8_t *dump; /* of a backup */
     uint8_t page_data[FLASH_PAGES_MOST * FLASH_PAGE_BYTES], back[FLASH_PAGES_MOST * FLASH_PAGE_BYTES];
-    uint8_t chunk[FLASH_READ_MOST];
+    uint8_t chunk[FLASH_BATCH_READ];
     uint8_t boot_page[FLASH_PAGE_BYTES];
 };
 
@@ -71,6 +73,8 @@ void job_set_todo(struct flash_job *job, uint32_t address, bool todo);
 /* Sectors of a pass, counted in the chip: first, and one behind the last that its data touch. */
 unsigned job_first_sector(const struct job_pass *pass);
 unsigned job_end_sector(const struct job_pass *pass);
+/* Comparing what was put off of the key (key_rest). */
+bool job_in_key_rest(const struct flash_job *job);
 /* Every page of the sector that has data must be written, after an erase. */
 void job_plan_erase(struct flash_job *job, const struct job_pass *pass, unsigned sector);
 void job_enter(struct flash_job *job, enum job_state state);

@@ -42,17 +42,23 @@ void job_plan_erase(struct flash_job *const job, const struct job_pass *const pa
         job_set_todo(job, at, true);
 }
 
-/* Compare one reading with what belongs there. Returns how many bytes could be judged: all, or up to the sector that
- * turned out to need an erase. */
-static void judge(struct flash_job *const job, const struct job_pass *const pass, const uint32_t offset,
+bool job_in_key_rest(const struct flash_job *const job)
+{
+    return job->key_rest > 0 && job->cursor >= job->key_rest && job->cursor < FLASH_SECTOR_BYTES;
+}
+
+/* Compare one reading with what belongs there; true when it is the same. */
+static bool judge(struct flash_job *const job, const struct job_pass *const pass, const uint32_t offset,
                   const size_t len)
 {
+    bool same = true;
     for (size_t i = 0; i < len; i++) {
         const uint32_t at = pass->range.start + offset + (uint32_t)i;
         uint8_t *const state = &job->plan.state[at / FLASH_SECTOR_BYTES];
         const uint8_t have = job->chunk[i], want = job_byte(pass, offset + (uint32_t)i);
         if (*state == FLASH_SECTOR_UNSEEN)
             *state = FLASH_SECTOR_SAME;
+        same = same && have == want;
         if (have == want || *state == FLASH_SECTOR_ERASE)
             continue;
         if (!job->difference.found)
@@ -64,6 +70,7 @@ static void judge(struct flash_job *const job, const struct job_pass *const pass
         *state = FLASH_SECTOR_WRITE;
         job_set_todo(job, at, true);
     }
+    return same;
 }
 
 static bool first_page_blank(const struct flash_job *const job, const size_t len)
@@ -74,16 +81,20 @@ static bool first_page_blank(const struct flash_job *const job, const size_t len
     return len >= FLASH_PAGE_BYTES;
 }
 
+static bool changes(const struct flash_job *const job, const struct job_pass *const pass)
+{
+    for (unsigned s = job_first_sector(pass); s < job_end_sector(pass); s++)
+        if (job->plan.state[s] > FLASH_SECTOR_SAME)
+            return true;
+    return false;
+}
+
 /* An image must not look valid while parts of it are missing. */
 static void plan_key(struct flash_job *const job, const unsigned index)
 {
     const struct job_pass *const pass = &job->passes[index];
-    const unsigned key = job_first_sector(pass);
-    bool changes = false;
-    for (unsigned s = key; s < job_end_sector(pass); s++)
-        changes = changes || job->plan.state[s] == FLASH_SECTOR_WRITE || job->plan.state[s] == FLASH_SECTOR_ERASE;
-    if (changes && !job->key_blank[index])
-        job_plan_erase(job, pass, key);
+    if (changes(job, pass) && !job->key_blank[index])
+        job_plan_erase(job, pass, job_first_sector(pass));
 }
 
 static void count(struct flash_job *const job)
@@ -123,24 +134,50 @@ static uint32_t skip_erased(const struct flash_job *const job, const struct job_
     return offset < end ? offset : end;
 }
 
+/* The key comes last, but for its beginning: it is erased anyway when another sector changes, and need not be read. */
+static uint32_t put_off_key(struct flash_job *const job, const uint32_t offset, const uint32_t end)
+{
+    if (job->kind != JOB_WRITE || job->cursor > 0 || offset >= FLASH_SECTOR_BYTES || end <= FLASH_SECTOR_BYTES)
+        return offset;
+    job->key_rest = offset;
+    return FLASH_SECTOR_BYTES;
+}
+
+static uint32_t next_offset(struct flash_job *const job, const struct job_pass *const pass, const size_t len)
+{
+    const uint32_t end = judged_bytes(job, pass), at = job->cursor + (uint32_t)len;
+    const bool in_rest = job_in_key_rest(job);
+    const uint32_t limit = in_rest ? FLASH_SECTOR_BYTES : end;
+    const uint32_t offset = skip_erased(job, pass, put_off_key(job, at, end));
+    if (offset < limit)
+        return offset;
+    const bool rest = job->key_rest > 0 && !in_rest && !(changes(job, pass) && !job->key_blank[job->pass]);
+    return rest ? job->key_rest : end;
+}
+
+/* Not into the next sector: that may be decided by its own beginning, as this one is. And no more than was the same in
+ * a row before: of a sector that is erased anyway the rest is read for nothing. */
+static size_t next_length(const struct flash_job *const job, const struct job_pass *const pass)
+{
+    const size_t in_sector = FLASH_SECTOR_BYTES - (pass->range.start + job->cursor) % FLASH_SECTOR_BYTES;
+    const size_t left = judged_bytes(job, pass) - job->cursor, in = left < in_sector ? left : in_sector;
+    const size_t ahead = job->alike < FLASH_BATCH_READ ? job->alike : FLASH_BATCH_READ;
+    const size_t most = job->kind == JOB_VERIFY ? FLASH_BATCH_READ : ahead > FLASH_READ_MOST ? ahead : FLASH_READ_MOST;
+    return in < most ? in : most;
+}
+
 int job_compare(struct flash_job *const job, struct hm2_diag *const diag)
 {
     const struct job_pass *const pass = &job->passes[job->pass];
     const uint32_t at = pass->range.start + job->cursor, end = judged_bytes(job, pass);
-    size_t len = end - job->cursor;
-    if (len > sizeof job->chunk)
-        len = sizeof job->chunk;
-    /* Not into the next sector: that may be decided by its own beginning, as this one is. */
-    const uint32_t left = FLASH_SECTOR_BYTES - at % FLASH_SECTOR_BYTES;
-    if (len > left)
-        len = left;
-    const int err = flash_read_some(job->card, at, job->chunk, &len, diag);
+    size_t len = next_length(job, pass);
+    const int err = flash_read_ahead(job->card, at, job->chunk, &len, diag);
     if (err < 0)
         return err;
     if (job->cursor == 0)
         job->key_blank[job->pass] = first_page_blank(job, len);
-    judge(job, pass, job->cursor, len);
-    job->cursor = skip_erased(job, pass, job->cursor + (uint32_t)len);
+    job->alike = judge(job, pass, job->cursor, len) ? job->alike + len : 0;
+    job->cursor = next_offset(job, pass, len);
     job->progress.address = at;
     if (job->kind == JOB_VERIFY && job->difference.found) {
         count(job);
@@ -149,7 +186,7 @@ int job_compare(struct flash_job *const job, struct hm2_diag *const diag)
     }
     if (job->cursor < end)
         return 0;
-    job->cursor = 0;
+    job->cursor = job->key_rest = 0;
     if (++job->pass == job->pass_count)
         finish_plan(job);
     return 0;

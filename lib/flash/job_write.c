@@ -248,7 +248,7 @@ int job_recheck(struct flash_job *const job, struct hm2_diag *const diag)
     size_t len = pass->bytes - job->cursor < left ? pass->bytes - job->cursor : left;
     if (len > sizeof job->chunk)
         len = sizeof job->chunk;
-    const int err = flash_read_some(job->card, at, job->chunk, &len, diag);
+    const int err = flash_read_ahead(job->card, at, job->chunk, &len, diag);
     if (err < 0)
         return err;
     for (uint32_t i = 0; i < len; i++) {

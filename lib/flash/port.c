@@ -52,21 +52,40 @@ static int64_t patience_of(const struct flash_port *const port, const enum flash
     return ns < patience[work].max_ns ? ns : patience[work].max_ns;
 }
 
+/* So many datagrams have come to the card since they were last counted, and so many were sent. */
+static void count_others(struct flash_port *const port, const uint16_t come)
+{
+    if (come > port->unaccounted)
+        port->counters.foreign += come - port->unaccounted;
+    port->behind += (int64_t)port->unaccounted - come;
+    port->rx_udp = (uint16_t)(port->rx_udp + come);
+    port->unaccounted = 0;
+}
+
+/* Before a request the scratch register held the number of one of ours, sent since the last that is known to have come,
+ * or somebody else has written it. */
+static void look_for_intruders(struct flash_port *const port)
+{
+    const uint16_t before = hm2_get_le16(port->reply + port->before_at);
+    if ((uint16_t)(before - port->accepted) > (uint16_t)(port->sequence - port->accepted))
+        port->intruders++;
+}
+
+static uint16_t come_since(const struct flash_port *const port, const size_t status_at)
+{
+    return (uint16_t)(hm2_get_le16(port->reply + status_at + LBP16_CONTROL_RX_UDP) - port->rx_udp);
+}
+
 /* Who else has been here since the last answer? */
 static void account(struct flash_port *const port)
 {
-    const uint16_t before = hm2_get_le16(port->reply + port->before_at);
-    const uint16_t rx_udp = hm2_get_le16(port->reply + port->status_at + LBP16_CONTROL_RX_UDP);
-    const uint16_t come = (uint16_t)(rx_udp - port->rx_udp);
+    const uint16_t come = come_since(port, port->status_at);
     if (port->greeted) {
-        if (come > port->unaccounted)
-            port->counters.foreign += come - port->unaccounted;
-        port->behind += (int64_t)port->unaccounted - come;
-        if (before != port->accepted && before != port->sequence)
-            port->intruders++;
+        look_for_intruders(port);
+        count_others(port, come);
     }
     port->greeted = true;
-    port->rx_udp = rx_udp;
+    port->rx_udp = hm2_get_le16(port->reply + port->status_at + LBP16_CONTROL_RX_UDP);
     port->unaccounted = 0;
     port->accepted = port->sequence;
 }
@@ -117,6 +136,62 @@ int flash_port_run(struct flash_port *const port, const enum flash_work work, co
     port->counters.replies++;
     account(port);
     return 0;
+}
+
+/* ---- several at once ----------------------------------------------------------------------------------------------
+ */
+
+#define STATUS_FROM_END (2u * (STATUS_WORDS + 1u)) /* status words, then the echo */
+
+void flash_batch_begin(const struct flash_port *const port, struct flash_batch *const batch)
+{
+    *batch = (struct flash_batch){.first = (uint16_t)(port->sequence + 1)};
+}
+
+int flash_batch_send(struct flash_port *const port, struct flash_batch *const batch)
+{
+    const int err = seal(port);
+    if (err < 0)
+        return err;
+    batch->part[batch->sent].reply_bytes = port->builder.reply_bytes;
+    batch->sent++;
+    port->counters.sent++;
+    port->unaccounted++;
+    return link_send(port->link, port->request, port->builder.used);
+}
+
+int flash_batch_receive(struct flash_port *const port, struct flash_batch *const batch)
+{
+    const int64_t deadline_ns = link_now_ns(port->link) + patience_of(port, FLASH_WORK_READ, 0);
+    for (unsigned i = 0; i < MAX_STALE; i++) {
+        const int len = link_recv(port->link, port->reply, sizeof port->reply, deadline_ns);
+        if (len < 0)
+            return len;
+        if ((size_t)len < STATUS_FROM_END + 2u) {
+            port->counters.stale++;
+            continue;
+        }
+        const unsigned which = (uint16_t)(hm2_get_le16(port->reply + len - 2) - batch->first);
+        if (which >= batch->sent || batch->part[which].answered || batch->part[which].reply_bytes != (size_t)len) {
+            port->counters.stale++;
+            continue;
+        }
+        const uint16_t come = come_since(port, (size_t)len - STATUS_FROM_END);
+        batch->part[which].answered = true;
+        batch->answered++;
+        batch->come = come > batch->come ? come : batch->come;
+        port->counters.replies++;
+        look_for_intruders(port);
+        return (int)which;
+    }
+    return HM2_ERR_TIMEOUT;
+}
+
+/* What is not answered stays open for the next exchange to account for. */
+void flash_batch_end(struct flash_port *const port, const struct flash_batch *const batch)
+{
+    if (batch->answered == batch->sent)
+        count_others(port, batch->come);
 }
 
 int flash_port_fire(struct flash_port *const port)

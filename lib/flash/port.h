@@ -36,6 +36,26 @@ void flash_port_init(struct flash_port *port, struct link *link);
  * work decides how long and how often. 0: port->reply holds the answer. HM2_ERR_TIMEOUT after the last try. */
 void flash_port_begin(struct flash_port *port);
 int HM2_MUST_CHECK flash_port_run(struct flash_port *port, enum flash_work work, unsigned tries);
+/*
+ * Several requests on their way at once, for reading only: nothing is sent twice, and whatever is missing in the end
+ * the caller asks for again, one request at a time. Begin; then for each request flash_port_begin(), commands, and
+ * send; take answers in between; end.
+ */
+#define FLASH_BATCH_MOST 16u
+struct flash_batch {
+    uint16_t first; /* sequence number */
+    unsigned sent, answered;
+    uint16_t come; /* the most datagrams that an answer says have come to the card since the batch began */
+    struct {
+        size_t reply_bytes;
+        bool answered;
+    } part[FLASH_BATCH_MOST];
+};
+void flash_batch_begin(const struct flash_port *port, struct flash_batch *batch);
+int HM2_MUST_CHECK flash_batch_send(struct flash_port *port, struct flash_batch *batch);
+/* Number of the request that port->reply answers; HM2_ERR_TIMEOUT when none comes. */
+int HM2_MUST_CHECK flash_batch_receive(struct flash_port *port, struct flash_batch *batch);
+void flash_batch_end(struct flash_port *port, const struct flash_batch *batch);
 /* Send without waiting: for what is never answered. */
 int HM2_MUST_CHECK flash_port_fire(struct flash_port *port);
 /* Let time pass; what arrives meanwhile is late and dropped. */

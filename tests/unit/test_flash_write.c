@@ -261,6 +261,75 @@ static void gives_up_on_a_worn_chip(void **state)
     assert_non_null(strstr(rig->diag.text, "0x120258 expected 0xFF but read 0x00"));
 }
 
+/* ---- reading -------------------------------------------------------------------------------------------------------
+ */
+
+static void read_all(struct flash_rig *const rig, uint8_t *const dump)
+{
+    flash_job_free(rig->job);
+    rig->job = NULL;
+    int err = flash_job_backup(&rig->job, rig->card, dump, rig->flash_bytes, &rig->options, &rig->diag);
+    if (err == 0)
+        err = flash_job_run(rig->job, NULL, NULL, &rig->diag);
+    if (err != 0)
+        fail_msg("%d: %s", err, rig->diag.text);
+    assert_memory_equal(dump, rig->flash, rig->flash_bytes);
+}
+
+static void reads_with_several_requests_ahead_until_one_is_lost(void **state)
+{
+    struct flash_rig *const rig = *state;
+    const struct sim_faults faults = {.seed = 5, .loss = 0.01};
+    uint8_t *const dump = calloc(1, rig->flash_bytes);
+    assert_non_null(dump);
+    read_all(rig, dump);
+    const struct flash_counters before = flash_card_counters(rig->card);
+    assert_int_equal(before.requests_ahead, 4);
+    assert_int_equal(before.foreign, 0);
+    assert_int_equal(before.resent, 0);
+    assert_int_equal(sim_net_set_faults(rig->net, &faults), 0);
+    memset(dump, 0, rig->flash_bytes);
+    read_all(rig, dump);
+    const struct flash_counters after = flash_card_counters(rig->card);
+    assert_int_equal(after.requests_ahead, 1);
+    assert_true(after.resent > 0);
+    assert_int_equal(after.foreign, 0); /* what was lost is not taken for another program */
+    free(dump);
+}
+
+static void answers_may_come_in_any_order_and_twice(void **state)
+{
+    struct flash_rig *const rig = *state;
+    uint8_t *const dump = calloc(1, rig->flash_bytes);
+    assert_non_null(dump);
+    for (uint64_t seed = 1; seed <= 5; seed++) {
+        const struct sim_faults faults = {
+            .seed = seed, .duplicate = 0.05, .reorder = 0.05, .truncate = 0.001 * (double)seed, .delay_max_ns = 900000};
+        flash_rig_reopen(rig);
+        assert_int_equal(sim_net_set_faults(rig->net, &faults), 0);
+        memset(dump, 0, rig->flash_bytes);
+        read_all(rig, dump);
+        assert_int_equal(sim_net_set_faults(rig->net, &(struct sim_faults){.seed = seed}), 0);
+    }
+    free(dump);
+}
+
+static void does_not_read_what_is_erased_anyway(void **state)
+{
+    struct flash_rig *const rig = *state;
+    flash_rig_must_write(rig);
+    flash_rig_take(rig, &(struct sim_flash_file){.seed = 1, .late_seed = 7, .late_bytes = 2000});
+    const uint64_t read = flash_card_counters(rig->card).bytes_read;
+    flash_rig_must_write(rig);
+    flash_rig_assert_image(rig, RIG_USER);
+    const size_t unchanged = (rig->image.payload_bytes / RIG_SECTOR - 1) * RIG_SECTOR; /* neither key nor last */
+    assert_in_range(flash_card_counters(rig->card).bytes_read - read, unchanged, unchanged + RIG_SECTOR);
+    const uint64_t again = flash_card_counters(rig->card).bytes_read;
+    flash_rig_must_write(rig); /* nothing to do, which only all of it can tell */
+    assert_in_range(flash_card_counters(rig->card).bytes_read - again, rig->image.payload_bytes,
+                    rig->image.payload_bytes + 8000);
+}
+
 /* ---- other jobs ----------------------------------------------------------------------------------------------------
  */
 
@@ -343,6 +412,10 @@ int main(void)
         ON_7I96S(survives_a_bad_network),
         ON_7I93(mends_a_sector_that_was_spoilt),
         ON_7I93(gives_up_on_a_worn_chip),
+        ON_7I93(reads_with_several_requests_ahead_until_one_is_lost),
+        ON_7I96S(answers_may_come_in_any_order_and_twice),
+        ON_7I93(does_not_read_what_is_erased_anyway),
+        ON_7I96S(does_not_read_what_is_erased_anyway),
         ON_7I93(verifies_and_finds_the_first_difference),
         ON_7I93(backs_up_and_restores_everything),
         ON_7I96S(backs_up_and_restores_everything),

@@ -135,9 +135,12 @@ static void print_outcome(struct cli *const cli, const char *const action, const
         say(cli, "%s %s: %u sectors the same, %llu erased, %llu pages written, %.1f s\n", card_name(cli), action,
             plan->same, (unsigned long long)(b->erases - a->erases), pages, outcome->took_s);
     if (cli->verbose && !cli->json)
-        say(cli, "  %llu datagrams, %llu repeated, %llu erases, %llu pages, %u pages a datagram, %.2f seconds\n",
+        say(cli,
+            "  %llu datagrams, %llu repeated, %llu erases, %llu pages, %u pages a datagram, %llu bytes read, %.2f "
+            "seconds\n",
             (unsigned long long)(b->sent - a->sent), (unsigned long long)(b->resent - a->resent),
-            (unsigned long long)(b->erases - a->erases), pages, b->pages_per_write, outcome->took_s);
+            (unsigned long long)(b->erases - a->erases), pages, b->pages_per_write, (unsigned long long)b->bytes_read,
+            outcome->took_s);
     json_begin(cli);
     json_text(cli, "action", action);
     json_bool(cli, "done", true);
@@ -436,7 +439,8 @@ int backup_to(struct cli *const cli, const char *const where)
         status = write_side_files(cli, path, dump, chip->bytes);
     }
     if (status == DONE && cli->verbose)
-        say(cli, "  Backup time: %.2f seconds\n", outcome.took_s);
+        say(cli, "  Backup time: %.2f seconds, %llu bytes read\n", outcome.took_s,
+            (unsigned long long)(outcome.after.bytes_read - outcome.before.bytes_read));
     free(dump);
     return status;
 }

@@ -183,6 +183,7 @@ struct flash_counters {
     uint64_t foreign;                         /* datagrams that the card got from others */
     uint64_t erases, pages, bytes_read;       /* done */
     unsigned pages_per_write, bytes_per_read; /* as large as they have grown */
+    unsigned requests_ahead;                  /* to read, on their way at once; 1 after one was lost */
 };
 HM2_API struct flash_counters flash_card_counters(const struct flash_card *card);
 
