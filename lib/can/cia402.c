@@ -64,7 +64,7 @@ static void decide(struct hm2_cia402 *const drive, const struct hm2_cia402_in *c
         drive->wanted = true;
     if (!in->enable)
         drive->wanted = drive->tripped = false;
-    else if (!in->online || in->quick_stop || left || is_faulty(state) || state == HM2_CIA402_QUICK_STOP_ACTIVE) {
+    else if (!in->online || in->quick_stop || left || is_faulty(state)) {
         drive->tripped = true;
         drive->wanted = false;
     }
@@ -84,12 +84,13 @@ static bool resets(struct hm2_cia402 *const drive, const struct hm2_cia402_in *c
     return drive->resetting;
 }
 
+/* What cannot be heard may hear: it shall not coast, but stop along its ramp, and may end that by itself. */
 static uint16_t command(const struct hm2_cia402 *const drive, const struct hm2_cia402_in *const in,
                         const enum hm2_cia402_state state)
 {
-    if (!in->online)
-        return DISABLE_VOLTAGE;
-    if (in->quick_stop && (state == HM2_CIA402_OPERATION_ENABLED || state == HM2_CIA402_QUICK_STOP_ACTIVE))
+    if (!in->online || state == HM2_CIA402_QUICK_STOP_ACTIVE)
+        return in->quick_stop || drive->tripped ? QUICK_STOP : DISABLE_VOLTAGE;
+    if (in->quick_stop && state == HM2_CIA402_OPERATION_ENABLED)
         return QUICK_STOP;
     return commands[state][drive->wanted];
 }

@@ -194,21 +194,21 @@ static void a_drive_that_leaves_is_not_enabled_again_by_itself(void **unused)
     }
 }
 
-static void a_lost_drive_is_commanded_off(void **unused)
+static void a_lost_drive_is_stopped_and_then_commanded_off(void **unused)
 {
     (void)unused;
     in.position_command = 7.0;
     enabled();
     in.online = false;
-    answers(0x0237, 0x00);
+    answers(0x0237, 0x02);
     assert_false(out.enabled);
     assert_true(out.fault);
     assert_int_equal(out.state, HM2_CIA402_UNKNOWN);
     assert_float_equal(out.position_target, 5.0, 0);
+    in.enable = false;
+    answers(0x0237, 0x00);
     in.online = true;
     answers(0x0240, 0x00);
-    in.enable = false;
-    step();
     enabled();
 }
 
@@ -233,9 +233,25 @@ static void a_quick_stop_is_held_and_ends_disabled(void **unused)
     assert_false(out.enabled);
     answers(0x0217, 0x02);
     in.quick_stop = false;
-    answers(0x0217, 0x00);
-    answers(0x0240, 0x00);
+    answers(0x0217, 0x02);
     assert_true(out.fault);
+    in.enable = false;
+    answers(0x0217, 0x00);
+    assert_false(out.fault);
+    in.enable = true; /* before the drive has left the state */
+    answers(0x0217, 0x00);
+    answers(0x0240, 0x06);
+}
+
+static void a_drive_that_stops_by_itself_may_do_so(void **unused)
+{
+    (void)unused;
+    enabled();
+    answers(0x0217, 0x02);
+    assert_true(out.fault);
+    answers(0x0217, 0x02);
+    in.enable = false;
+    answers(0x0217, 0x00);
 }
 
 static void homing_counts_when_the_drive_has_moved(void **unused)
@@ -351,9 +367,10 @@ int main(void)
         WITH_DRIVE(after_a_fault_enable_must_fall_and_rise),
         WITH_DRIVE(a_reset_that_does_not_help_ends_and_can_be_repeated),
         WITH_DRIVE(a_drive_that_leaves_is_not_enabled_again_by_itself),
-        WITH_DRIVE(a_lost_drive_is_commanded_off),
+        WITH_DRIVE(a_lost_drive_is_stopped_and_then_commanded_off),
         WITH_DRIVE(enabling_what_is_not_there_is_a_fault),
         WITH_DRIVE(a_quick_stop_is_held_and_ends_disabled),
+        WITH_DRIVE(a_drive_that_stops_by_itself_may_do_so),
         WITH_DRIVE(homing_counts_when_the_drive_has_moved),
         WITH_DRIVE(homing_that_fails_is_told),
         cmocka_unit_test(a_node_is_started_when_it_has_booted),

@@ -73,8 +73,9 @@ struct hm2_cia402 {
 HM2_API enum hm2_cia402_state hm2_cia402_state(uint16_t statusword);
 
 /* Nothing is enabled again by itself: after a fault, a quick stop, a drive that left "operation enabled" or that was
- * not online, enable must fall and rise. The first command after that starts from where the drive is. Commands that
- * are no number count as the actual position and as no velocity. now_ns is any clock that goes on steadily. */
+ * not online, enable must fall and rise. Until it falls, a drive that stops or is not online is told to do a quick
+ * stop; then, to switch off. The first command after that starts from where the drive is. Commands that are no number
+ * count as the actual position and as no velocity. now_ns is any clock that goes on steadily. */
 HM2_API void hm2_cia402_step(struct hm2_cia402 *drive, const struct hm2_cia402_in *in, int64_t now_ns,
                              struct hm2_cia402_out *out);
 
