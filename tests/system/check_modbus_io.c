@@ -46,7 +46,7 @@ struct device {
 static struct device *device;
 static pid_t server;
 static char address[16], folder[64], terminal[64];
-static int master = -1;
+static int master = -1, response_ms;
 static struct talk hal;
 
 static bool is_write(const int function)
@@ -192,6 +192,7 @@ static void set_up(void)
     ck_assert_ptr_nonnull(mkdtemp(folder));
     ck_assert_int_eq(chmod(folder, 0755), 0);
     master = -1;
+    response_ms = 300;
 }
 
 static void tear_down(void)
@@ -206,7 +207,8 @@ static void tear_down(void)
 static const char *tcp_link(void)
 {
     static char text[200];
-    snprintf(text, sizeof text, "LINK_TYPE=tcp\nTCP_IP=%s\nTCP_PORT=%d\nMB_RESPONSE_TIMEOUT_MS=300\n", address, PORT);
+    snprintf(text, sizeof text, "LINK_TYPE=tcp\nTCP_IP=%s\nTCP_PORT=%d\nMB_RESPONSE_TIMEOUT_MS=%d\n", address, PORT,
+             response_ms);
     return text;
 }
 
@@ -454,8 +456,25 @@ START_TEST(silence_and_wrong_checksums_on_a_terminal)
 }
 END_TEST
 
+START_TEST(a_port_without_rs485_is_told_with_what_to_do)
+{
+    open_terminal();
+    write_file("rs485.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=1\n", serial_link(),
+               "SERIAL_RS485=1\nMB_TX_CODE=fnct_03_read_holding_registers\nFIRST_ELEMENT=1\nNELEMENTS=1\n");
+    start_server();
+    load(path("rs485.ini"));
+    talk_do(&hal, "start");
+    talk_wait_text(&hal, "no RS-485 mode. Leave SERIAL_RS485 out");
+    await_pin("mb2hal.00.errors", 2, 1e9);
+    ck_assert_double_eq(talk_value(&hal, "mb2hal.00.connected"), 0);
+    ck_assert_uint_eq(device->asked, 0);
+    talk_end(&hal);
+}
+END_TEST
+
 START_TEST(an_exception_is_an_answer_and_counts_for_its_transaction_alone)
 {
+    response_ms = 20000; /* a busy machine is no error */
     write_file(
         "exception.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=2\n", tcp_link(),
         "MB_TX_CODE=fnct_03_read_holding_registers\nFIRST_ELEMENT=5000\nNELEMENTS=1\nHAL_TX_NAME=out-of-range\n"
@@ -637,6 +656,7 @@ int main(void)
     tcase_add_test(tests, a_server_that_was_killed_and_comes_back_gets_its_outputs_again);
     tcase_add_test(tests, silent_slow_and_truncated_answers_over_tcp);
     tcase_add_test(tests, silence_and_wrong_checksums_on_a_terminal);
+    tcase_add_test(tests, a_port_without_rs485_is_told_with_what_to_do);
     tcase_add_test(tests, an_exception_is_an_answer_and_counts_for_its_transaction_alone);
     tcase_add_test(tests, a_unit_that_is_not_there_does_not_stop_the_others_on_the_line);
     tcase_add_test(tests, a_wrong_file_is_refused_with_its_line_and_files_are_instances);
