@@ -81,7 +81,7 @@ LINUXCNC_HAL_LIBS ?= $(if $(findstring /,$(shell $(CC) -print-file-name=liblinux
 LINUXCNC_PROGRAMS := $(if $(strip $(LINUXCNC_HAL_LIBS)),$(if $(strip $(MODBUS_LIBS)),$(BUILDDIR)/linuxcnc/hm2_mb2hal))
 ifeq ($(strip $(MODBUS_LIBS)),)
 COMPONENTS := $(filter-out modbus_io,$(COMPONENTS))
-SYSTEM_TESTS := $(filter-out check_modbus_io check_modbus_rtu check_vfd_spindle,$(SYSTEM_TESTS))
+SYSTEM_TESTS := $(filter-out check_modbus_io check_modbus_cycle check_modbus_rtu check_vfd_spindle,$(SYSTEM_TESTS))
 endif
 
 obj = $(patsubst %.c,$(BUILDDIR)/obj/%.o,$(1))
@@ -265,6 +265,12 @@ $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPE
 		-lm -lpthread
 $(BUILDDIR)/system/check_modbus_io: SYSTEM_LIBS := $(MODBUS_LIBS)
 
+# These count calls of the C library in their process; one has the insides of modbus_io there, and RTAPI's messages.
+$(BUILDDIR)/system/check_modbus_cycle: $(call obj,$(addprefix components/modbus_io/,engine.c instance.c pins.c) \
+	components/common/messenger.c) $(HOST_A)
+$(BUILDDIR)/system/check_modbus_cycle: SYSTEM_LIBS := $(HOST_A) $(LIB_A) $(MODBUS_LIBS)
+$(BUILDDIR)/system/check_modbus_cycle $(BUILDDIR)/system/check_cyclic_libc: $(call obj,$(wildcard tests/system/libc/*.c))
+
 # These run drivers in their process, which find HAL, RTAPI and the C library's sockets there.
 $(BUILDDIR)/system/check_dropin_behaviour $(BUILDDIR)/system/check_dropin_loads $(BUILDDIR)/system/check_dropin_ppmc: \
 $(BUILDDIR)/system/%: $(BUILDDIR)/obj/tests/system/%.o $(call obj,$(SYSTEM_HELPERS) \
@@ -369,5 +375,5 @@ clean: ## remove the build folder
 	rm -rf $(BUILDDIR)
 
 -include $(patsubst %.o,%.d,$(LIB_OBJ) $(SIM_OBJ) $(HOST_OBJ) \
-	$(call obj,$(wildcard tools/*/*.c components/*/*.c tests/*/*.c tests/system/dropin/*.c)) $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc/%.o, \
+	$(call obj,$(wildcard tools/*/*.c components/*/*.c tests/*/*.c tests/system/dropin/*.c tests/system/libc/*.c)) $(patsubst %.c,$(BUILDDIR)/obj/linuxcnc/%.o, \
 	$(wildcard components/*/*.c)) $(MB2HAL_OBJ))

@@ -215,24 +215,30 @@ static void close_line(struct line *const line)
     forget(line, NULL);
 }
 
-static int prepare_serial(const struct line *const line)
+/* NULL, or what went wrong, with errno. */
+static const char *prepare_serial(const struct line *const line)
 {
     if (line->map->rs485 && modbus_rtu_set_serial_mode(line->modbus, MODBUS_RTU_RS485) != 0)
-        return -1;
-    if (line->map->rts == HM2_MODBUS_RTS_NONE)
-        return 0;
-    return modbus_rtu_set_rts(line->modbus,
-                              line->map->rts == HM2_MODBUS_RTS_UP ? MODBUS_RTU_RTS_UP : MODBUS_RTU_RTS_DOWN);
+        return "its driver has no RS-485 mode. Leave SERIAL_RS485 out for an adapter that turns its transmitter on by "
+               "itself, and where RTS does that, say SERIAL_RTS=up or down";
+    if (line->map->rts != HM2_MODBUS_RTS_NONE &&
+        modbus_rtu_set_rts(line->modbus,
+                           line->map->rts == HM2_MODBUS_RTS_UP ? MODBUS_RTU_RTS_UP : MODBUS_RTU_RTS_DOWN) != 0)
+        return "RTS cannot be set";
+    return NULL;
 }
 
 static void open_line(struct line *const line)
 {
-    if (modbus_connect(line->modbus) == 0 && (line->map->tcp || prepare_serial(line) == 0)) {
+    const char *problem = modbus_connect(line->modbus) == 0 ? NULL : "cannot be opened";
+    if (!problem && !line->map->tcp)
+        problem = prepare_serial(line);
+    if (!problem) {
         line->open = true;
         (void)modbus_flush(line->modbus);
         return;
     }
-    tell(line, "cannot be opened", errno);
+    tell(line, problem, errno);
     close_line(line);
     for (unsigned i = 0; i < line->engine->map->transaction_count; i++)
         if (of_line(line, &line->engine->transactions[i]))

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-#include "modbus_io/instance.h"
+#include "instance.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -6,8 +6,8 @@
 #include <hm2/modbus.h>
 #include <hm2/points.h>
 
-#include "modbus_io/engine.h"
-#include "modbus_io/pins.h"
+#include "engine.h"
+#include "pins.h"
 
 struct instance {
     struct hm2_modbus_map *map;

@@ -85,18 +85,25 @@ static void store(const union pin *const pin, const enum hm2_point_type type, co
         *pin->number = number;
 }
 
+/* Of elements that are read and written; binders may keep them, and get the whole name besides. */
+#define ELEMENT_POINT(point_type, point_dir)                                         \
+    {                                                                                \
+        .name = "", .type = (point_type), .dir = (point_dir), .unit = "", .help = "" \
+    }
+static const struct hm2_point element_points[][2] = {
+    [HM2_BIT] = {ELEMENT_POINT(HM2_BIT, HM2_PIN_OUT), ELEMENT_POINT(HM2_BIT, HM2_PIN_IN)},
+    [HM2_S32] = {ELEMENT_POINT(HM2_S32, HM2_PIN_OUT), ELEMENT_POINT(HM2_S32, HM2_PIN_IN)},
+    [HM2_FLOAT] = {ELEMENT_POINT(HM2_FLOAT, HM2_PIN_OUT), ELEMENT_POINT(HM2_FLOAT, HM2_PIN_IN)},
+};
+
 static int create_pin(const struct maker *const maker, const struct hm2_modbus_element *const element,
                       const char *const suffix, const enum hm2_point_type type, const double initial,
                       union pin *const pin)
 {
-    const struct hm2_point point = {.name = suffix,
-                                    .type = type,
-                                    .dir = hm2_modbus_writes(maker->tx->function) ? HM2_PIN_IN : HM2_PIN_OUT,
-                                    .unit = "",
-                                    .help = ""};
+    const struct hm2_point *const point = &element_points[type][hm2_modbus_writes(maker->tx->function)];
     char name[HM2_NAME_SIZE * 2];
     (void)snprintf(name, sizeof name, "%s.%s.%s%s", maker->map->component, maker->tx->name, element->name, suffix);
-    const int err = maker->binder->create(maker->binder, name, &point, pin, maker->diag);
+    const int err = maker->binder->create(maker->binder, name, point, pin, maker->diag);
     if (!err)
         store(pin, type, initial);
     return err;

@@ -1,18 +1,14 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * No allocation, no lock, no formatting in a cycle, whatever happens in it: this program brings its own malloc, locks
- * and printf family, which count while the thread that runs the cycle is inside of it. The card is simulated in another
+ * No allocation, no lock, no formatting in a cycle, whatever happens in it: libc/watch.h counts such calls while the
+ * thread that runs the cycle is inside of it. The card is simulated in another
  * thread, on UDP over loopback, with a bad network in front, a reset of its power, and a freeze.
  */
-#undef _FORTIFY_SOURCE /* its inline functions would stand in for ours */
 #include <arpa/inet.h>
 #include <check.h>
-#include <dlfcn.h>
 #include <math.h>
 #include <poll.h>
 #include <pthread.h>
-#include <semaphore.h>
-#include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,162 +20,8 @@
 #include <hm2/board.h>
 #include <hm2/sim.h>
 
+#include "libc/watch.h"
 #include "process.h"
-
-#if defined __has_feature
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define OTHER_ALLOCATOR 1
-#endif
-#endif
-#if defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__ || !defined __GLIBC__
-#define OTHER_ALLOCATOR 1
-#endif
-
-/* ---- who calls what? ----------------------------------------------------------------------------------------------
- */
-
-enum kind { ALLOCATION, LOCK, FORMATTING, KINDS };
-
-static _Thread_local bool watched;
-static _Thread_local unsigned long calls[KINDS];
-static _Thread_local const char *last_call[KINDS];
-
-#ifndef OTHER_ALLOCATOR
-
-static void note(const enum kind kind, const char *const name)
-{
-    if (!watched)
-        return;
-    calls[kind]++;
-    last_call[kind] = name;
-}
-
-void *__libc_malloc(size_t size);
-void *__libc_calloc(size_t count, size_t size);
-void *__libc_realloc(void *memory, size_t size);
-void *__libc_memalign(size_t alignment, size_t size);
-void __libc_free(void *memory);
-
-void *malloc(const size_t size)
-{
-    note(ALLOCATION, "malloc");
-    return __libc_malloc(size);
-}
-
-void *calloc(const size_t count, const size_t size)
-{
-    note(ALLOCATION, "calloc");
-    return __libc_calloc(count, size);
-}
-
-void *realloc(void *const memory, const size_t size)
-{
-    note(ALLOCATION, "realloc");
-    return __libc_realloc(memory, size);
-}
-
-void *aligned_alloc(const size_t alignment, const size_t size)
-{
-    note(ALLOCATION, "aligned_alloc");
-    return __libc_memalign(alignment, size);
-}
-
-void free(void *const memory)
-{
-    note(ALLOCATION, "free");
-    __libc_free(memory);
-}
-
-/* glibc's function of this name behind ours. */
-static void find_next(const char *const name, void *const function, const size_t size)
-{
-    void *const next = dlsym(RTLD_NEXT, name);
-    memcpy(function, &next, size);
-}
-
-#define FORWARD_LOCK(name, parameter)                     \
-    int name(parameter);                                  \
-    int name(parameter argument)                          \
-    {                                                     \
-        static int (*next)(parameter);                    \
-        note(LOCK, #name);                                \
-        if (!next)                                        \
-            find_next(#name, (void *)&next, sizeof next); \
-        return next(argument);                            \
-    }
-
-FORWARD_LOCK(pthread_mutex_lock, pthread_mutex_t *)
-FORWARD_LOCK(pthread_mutex_trylock, pthread_mutex_t *)
-FORWARD_LOCK(pthread_rwlock_rdlock, pthread_rwlock_t *)
-FORWARD_LOCK(pthread_rwlock_wrlock, pthread_rwlock_t *)
-FORWARD_LOCK(pthread_spin_lock, pthread_spinlock_t *)
-FORWARD_LOCK(pthread_cond_signal, pthread_cond_t *)
-FORWARD_LOCK(pthread_cond_broadcast, pthread_cond_t *)
-FORWARD_LOCK(sem_wait, sem_t *)
-FORWARD_LOCK(sem_post, sem_t *)
-
-static int format_to(char *const text, const size_t size, const char *const format, va_list args)
-    __attribute__((format(printf, 3, 0)));
-static int format_to(char *const text, const size_t size, const char *const format, va_list args)
-{
-    static int (*next)(char *, size_t, const char *, va_list);
-    if (!next)
-        find_next("vsnprintf", (void *)&next, sizeof next);
-    return next(text, size, format, args);
-}
-
-int vsnprintf(char *const text, const size_t size, const char *const format, va_list args)
-{
-    note(FORMATTING, "vsnprintf");
-    return format_to(text, size, format, args);
-}
-
-int snprintf(char *const text, const size_t size, const char *const format, ...)
-{
-    va_list args;
-    note(FORMATTING, "snprintf");
-    va_start(args, format);
-    const int len = format_to(text, size, format, args);
-    va_end(args);
-    return len;
-}
-
-static int format_out(FILE *const file, const char *const format, va_list args) __attribute__((format(printf, 2, 0)));
-static int format_out(FILE *const file, const char *const format, va_list args)
-{
-    static int (*next)(FILE *, const char *, va_list);
-    if (!next)
-        find_next("vfprintf", (void *)&next, sizeof next);
-    return next(file, format, args);
-}
-
-int vfprintf(FILE *const file, const char *const format, va_list args)
-{
-    note(FORMATTING, "vfprintf");
-    return format_out(file, format, args);
-}
-
-int fprintf(FILE *const file, const char *const format, ...)
-{
-    va_list args;
-    note(FORMATTING, "fprintf");
-    va_start(args, format);
-    const int len = format_out(file, format, args);
-    va_end(args);
-    return len;
-}
-
-int printf(const char *const format, ...)
-{
-    va_list args;
-    note(FORMATTING, "printf");
-    va_start(args, format);
-    const int len = format_out(stdout, format, args);
-    va_end(args);
-    return len;
-}
-
-#endif
 
 /* ---- the card, in a thread of its own -----------------------------------------------------------------------------
  */
@@ -381,12 +223,12 @@ static void cycle(struct host *const h, const bool changes)
 {
     for (unsigned i = 0; changes && i < 4; i++)
         change_something(h);
-    watched = true;
+    watch_begin();
     if (h->cycles % 2 == 0)
         hm2_board_request(h->board, PERIOD_NS);
     hm2_board_read(h->board, PERIOD_NS);
     hm2_board_write(h->board, PERIOD_NS);
-    watched = false;
+    watch_end();
     h->cycles++;
     if (h->cycles % 64 == 0)
         read_messages(h);
@@ -472,7 +314,7 @@ START_TEST(no_cycle_allocates_locks_or_formats_whatever_happens)
     static struct host host;
     static struct card card;
     char address[16];
-#ifdef OTHER_ALLOCATOR
+#if !WATCH_WORKS
     printf("SKIP: a sanitizer brings its own allocator, so calls cannot be counted\n");
     return;
 #endif
@@ -484,29 +326,30 @@ START_TEST(no_cycle_allocates_locks_or_formats_whatever_happens)
     unload(&host);
     stop_card(&card);
     ck_assert_uint_gt(host.cycles, 10000);
-    for (enum kind kind = 0; kind < KINDS; kind++)
-        if (calls[kind] > 0)
-            ck_abort_msg("%lu calls in %u cycles, the last one of %s", calls[kind], host.cycles, last_call[kind]);
+    for (enum watch_kind kind = 0; kind < WATCH_KINDS; kind++)
+        if (watch_calls(kind) > 0)
+            ck_abort_msg("%lu calls in %u cycles, the last one of %s", watch_calls(kind), host.cycles,
+                         watch_last(kind));
 }
 END_TEST
 
 /* The counters see what the library does outside its cycle. */
 START_TEST(calls_of_the_library_are_seen)
 {
-#ifdef OTHER_ALLOCATOR
+#if !WATCH_WORKS
     return;
 #else
     pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
     struct hm2_diag diag = {0};
-    watched = true;
+    watch_begin();
     hm2_board_free(hm2_board_new());
     hm2_diag_warn(&diag, "%d", 1);
     pthread_mutex_lock(&mutex);
-    watched = false;
+    watch_end();
     pthread_mutex_unlock(&mutex);
-    ck_assert_uint_ge(calls[ALLOCATION], 2);
-    ck_assert_uint_ge(calls[FORMATTING], 1);
-    ck_assert_uint_ge(calls[LOCK], 1);
+    ck_assert_uint_ge(watch_calls(WATCH_ALLOCATION), 2);
+    ck_assert_uint_ge(watch_calls(WATCH_FORMATTING), 1);
+    ck_assert_uint_ge(watch_calls(WATCH_LOCK), 1);
 #endif
 }
 END_TEST

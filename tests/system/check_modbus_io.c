@@ -46,7 +46,7 @@ struct device {
 static struct device *device;
 static pid_t server;
 static char address[16], folder[64], terminal[64];
-static int master = -1;
+static int master = -1, response_ms;
 static struct talk hal;
 
 static bool is_write(const int function)
@@ -192,6 +192,7 @@ static void set_up(void)
     ck_assert_ptr_nonnull(mkdtemp(folder));
     ck_assert_int_eq(chmod(folder, 0755), 0);
     master = -1;
+    response_ms = 300;
 }
 
 static void tear_down(void)
@@ -206,7 +207,8 @@ static void tear_down(void)
 static const char *tcp_link(void)
 {
     static char text[200];
-    snprintf(text, sizeof text, "LINK_TYPE=tcp\nTCP_IP=%s\nTCP_PORT=%d\nMB_RESPONSE_TIMEOUT_MS=300\n", address, PORT);
+    snprintf(text, sizeof text, "LINK_TYPE=tcp\nTCP_IP=%s\nTCP_PORT=%d\nMB_RESPONSE_TIMEOUT_MS=%d\n", address, PORT,
+             response_ms);
     return text;
 }
 
@@ -454,8 +456,25 @@ START_TEST(silence_and_wrong_checksums_on_a_terminal)
 }
 END_TEST
 
+START_TEST(a_port_without_rs485_is_told_with_what_to_do)
+{
+    open_terminal();
+    write_file("rs485.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=1\n", serial_link(),
+               "SERIAL_RS485=1\nMB_TX_CODE=fnct_03_read_holding_registers\nFIRST_ELEMENT=1\nNELEMENTS=1\n");
+    start_server();
+    load(path("rs485.ini"));
+    talk_do(&hal, "start");
+    talk_wait_text(&hal, "no RS-485 mode. Leave SERIAL_RS485 out");
+    await_pin("mb2hal.00.errors", 2, 1e9);
+    ck_assert_double_eq(talk_value(&hal, "mb2hal.00.connected"), 0);
+    ck_assert_uint_eq(device->asked, 0);
+    talk_end(&hal);
+}
+END_TEST
+
 START_TEST(an_exception_is_an_answer_and_counts_for_its_transaction_alone)
 {
+    response_ms = 20000; /* a busy machine is no error */
     write_file(
         "exception.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=2\n", tcp_link(),
         "MB_TX_CODE=fnct_03_read_holding_registers\nFIRST_ELEMENT=5000\nNELEMENTS=1\nHAL_TX_NAME=out-of-range\n"
@@ -518,8 +537,11 @@ END_TEST
 
 /* ---- peers -------------------------------------------------------------------------------------------------------*/
 
-/* What a program under halrun makes of all.ini; false when this machine cannot run it. */
-static bool run_program(struct process *const halrun, const char *const program, struct device *const after)
+static const char in_a_thread[] = "loadrt threads name1=servo period1=1000000\naddf mb2hal.update servo\nstart\n";
+
+/* What is loaded under halrun makes of all.ini; false when this machine cannot run it. */
+static bool run_peer(struct process *const halrun, const char *const load, const char *const more,
+                     struct device *const after)
 {
     static const struct mb2hal_pin until[] = {{"mb2hal.02.01.int", "1008"},
                                               {"mb2hal.03.00.int", "65535"},
@@ -527,8 +549,10 @@ static bool run_program(struct process *const halrun, const char *const program,
                                               {"mb2hal.00.01.bit", "TRUE"},
                                               {NULL, NULL}};
     struct device before;
+    char commands[1000];
+    snprintf(commands, sizeof commands, "%s%s", settings, more);
     memcpy(&before, device, sizeof before);
-    if (!mb2hal_start(halrun, folder, program, "all.ini", settings, until)) {
+    if (!mb2hal_start(halrun, folder, load, "all.ini", commands, until)) {
         printf("%s", halrun->text);
         return false;
     }
@@ -551,7 +575,7 @@ START_TEST(debians_mb2hal_has_the_same_pins_and_writes_the_same)
     static struct device after_mb2hal;
     write_file("all.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=8\n", tcp_link(), all_types);
     start_server();
-    if (!run_program(&halrun, "mb2hal", &after_mb2hal))
+    if (!run_peer(&halrun, "loadusr -W mb2hal", "", &after_mb2hal))
         return;
     load(path("all.ini"));
     talk_do(&hal, "%sstart", settings);
@@ -568,20 +592,39 @@ END_TEST
 
 START_TEST(hm2_mb2hal_is_mb2hal_with_more_pins)
 {
-    static const char program[] = TEST_BUILD "/linuxcnc/hm2_mb2hal";
     static struct process theirs, ours;
     static struct device after_theirs, after_ours;
-    if (access(program, X_OK) != 0) {
+    if (access(TEST_BUILD "/linuxcnc/hm2_mb2hal", X_OK) != 0) {
         printf("SKIP: hm2_mb2hal is not built: LinuxCNC's library for programs is missing (linuxcnc-uspace-dev)\n");
         return;
     }
     write_file("all.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=8\n", tcp_link(), all_types);
     start_server();
-    if (!run_program(&theirs, "mb2hal", &after_theirs) || !run_program(&ours, program, &after_ours))
+    if (!run_peer(&theirs, "loadusr -W mb2hal", "", &after_theirs) ||
+        !run_peer(&ours, "loadusr -W " TEST_BUILD "/linuxcnc/hm2_mb2hal", "", &after_ours))
         return;
     ck_assert_uint_eq(mb2hal_missing(theirs.text, ours.text), 0);
     expect_same_tables(&after_ours, &after_theirs);
     ck_assert_ptr_nonnull(strstr(ours.text, "mb2hal.02.stale"));
+}
+END_TEST
+
+START_TEST(modbus_io_in_linuxcnc_has_mb2hals_pins_and_writes_the_same)
+{
+    static struct process theirs, ours;
+    static struct device after_theirs, after_ours;
+    if (TEST_SANITIZED) {
+        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
+        return;
+    }
+    write_file("all.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=8\n", tcp_link(), all_types);
+    start_server();
+    ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
+    if (!run_peer(&theirs, "loadusr -W mb2hal", "", &after_theirs) ||
+        !run_peer(&ours, "loadrt modbus_io", in_a_thread, &after_ours))
+        return;
+    ck_assert_uint_eq(mb2hal_missing(theirs.text, ours.text), 0);
+    expect_same_tables(&after_ours, &after_theirs);
 }
 END_TEST
 
@@ -637,11 +680,13 @@ int main(void)
     tcase_add_test(tests, a_server_that_was_killed_and_comes_back_gets_its_outputs_again);
     tcase_add_test(tests, silent_slow_and_truncated_answers_over_tcp);
     tcase_add_test(tests, silence_and_wrong_checksums_on_a_terminal);
+    tcase_add_test(tests, a_port_without_rs485_is_told_with_what_to_do);
     tcase_add_test(tests, an_exception_is_an_answer_and_counts_for_its_transaction_alone);
     tcase_add_test(tests, a_unit_that_is_not_there_does_not_stop_the_others_on_the_line);
     tcase_add_test(tests, a_wrong_file_is_refused_with_its_line_and_files_are_instances);
     tcase_add_test(tests, debians_mb2hal_has_the_same_pins_and_writes_the_same);
     tcase_add_test(tests, hm2_mb2hal_is_mb2hal_with_more_pins);
+    tcase_add_test(tests, modbus_io_in_linuxcnc_has_mb2hals_pins_and_writes_the_same);
     tcase_add_test(tests, a_server_of_pymodbus_gives_back_what_is_written);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);

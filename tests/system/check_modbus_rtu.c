@@ -123,7 +123,7 @@ START_TEST(pymodbus_gives_back_what_modbus_io_and_mb2hal_write)
     talk_end(&hal);
     process_stop(&pymodbus, SIGKILL, LIMIT_MS);
     ck_assert(start_pymodbus());
-    if (!mb2hal_start(&halrun, folder, "mb2hal", "map.ini", settings, outcome)) {
+    if (!mb2hal_start(&halrun, folder, "loadusr -W mb2hal", "map.ini", settings, outcome)) {
         printf("%s", halrun.text);
         return;
     }

@@ -6,11 +6,14 @@
 #include <check.h>
 #include <glob.h>
 #include <signal.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "serial_pair.h"
 #include "simulator.h"
 #include "talk.h"
 
@@ -105,6 +108,47 @@ START_TEST(a_drive_that_was_away_is_told_its_speed_again)
 }
 END_TEST
 
+static void write_text(const char *const name, const mode_t mode, const char *const format, ...)
+    __attribute__((format(printf, 3, 4)));
+static void write_text(const char *const name, const mode_t mode, const char *const format, ...)
+{
+    FILE *const file = fopen(name, "we");
+    va_list arguments;
+    ck_assert_ptr_nonnull(file);
+    va_start(arguments, format);
+    ck_assert_int_ge(vfprintf(file, format, arguments), 0);
+    va_end(arguments);
+    ck_assert_int_eq(fclose(file), 0);
+    ck_assert_int_eq(chmod(name, mode), 0);
+}
+
+/* The simulated drive is the one that LinuxCNC's driver for the real one knows. */
+START_TEST(linuxcncs_driver_runs_the_simulated_drive_to_its_speed)
+{
+    static struct process halrun;
+    static struct serial_pair pair;
+    const char *const argv[] = {TEST_SOURCE "/tests/system/halrun-user", "peer.hal", NULL};
+    serial_pair_open(&pair);
+    snprintf(terminal, sizeof terminal, "%s", pair.device);
+    ck_assert_int_eq(chmod(folder, 0755), 0);
+    write_text("wait", 0755,
+               "#!/bin/sh\nuntil [ \"$(halcmd getp wj200-vfd.0.is-at-speed)\" = TRUE ]; do sleep 0.1; done\n");
+    write_text("peer.hal", 0644,
+               "loadusr -W wj200_vfd --device %s\nsetp wj200-vfd.0.mbslaveaddr 1\n"
+               "setp wj200-vfd.0.commanded-frequency 15\nsetp wj200-vfd.0.reverse 1\nsetp wj200-vfd.0.enable 1\n"
+               "setp wj200-vfd.0.run 1\nloadusr -w %s/wait\ngetp wj200-vfd.0.is-running\n",
+               pair.client, folder);
+    if (start_drive()) {
+        (void)process_run(&halrun, argv, LIMIT_MS * 2);
+        if (halrun.status == 77)
+            printf("%s", halrun.text);
+        else if (!process_wait_line(&halrun, "TRUE", 0, NULL))
+            ck_abort_msg("the drive does not reach its speed: %.2000s", halrun.text);
+    }
+    serial_pair_close(&pair);
+}
+END_TEST
+
 START_TEST(the_maps_of_the_examples_are_good)
 {
     static struct process check;
@@ -128,6 +172,7 @@ int main(void)
     tcase_set_timeout(tests, 120);
     tcase_add_checked_fixture(tests, set_up, tear_down);
     tcase_add_test(tests, a_speed_command_leads_to_the_speed_and_back_to_rest);
+    tcase_add_test(tests, linuxcncs_driver_runs_the_simulated_drive_to_its_speed);
     tcase_add_test(tests, the_maps_of_the_examples_are_good);
     tcase_add_test(tests, a_drive_that_was_away_is_told_its_speed_again);
     suite_add_tcase(suite, tests);

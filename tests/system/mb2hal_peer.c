@@ -35,15 +35,15 @@ static void write_wait(const char *const folder, const struct mb2hal_pin *until)
     write_text(folder, "wait", text, 0755);
 }
 
-bool mb2hal_start(struct process *const halrun, const char *const folder, const char *const program,
-                  const char *const config, const char *const settings, const struct mb2hal_pin *const until)
+bool mb2hal_start(struct process *const halrun, const char *const folder, const char *const load,
+                  const char *const config, const char *const commands, const struct mb2hal_pin *const until)
 {
     char text[2000], file[256];
     snprintf(file, sizeof file, "%s/go", folder);
     (void)unlink(file); /* of a run before */
     write_wait(folder, until);
-    snprintf(text, sizeof text, "loadusr -W %s config=%s/%s\n%sloadusr -w %s/wait\nshow pin\n", program, folder, config,
-             settings, folder);
+    snprintf(text, sizeof text, "%s config=%s/%s\n%sloadusr -w %s/wait\nshow pin\n", load, folder, config, commands,
+             folder);
     write_text(folder, "peer.hal", text, 0644);
     snprintf(file, sizeof file, "%s/peer.hal", folder);
     const char *const argv[] = {TEST_SOURCE "/tests/system/halrun-user", file, NULL};

@@ -9,10 +9,10 @@ struct mb2hal_pin {
     const char *name, *value; /* as halcmd getp prints it */
 };
 
-/* Start halrun with the program and its file, `config` in `folder`, and setp commands. False when this machine cannot
- * run it: what it printed says why. `until` ends with a pin without a name. */
-bool mb2hal_start(struct process *halrun, const char *folder, const char *program, const char *config,
-                  const char *settings, const struct mb2hal_pin *until);
+/* Start halrun with a command that loads ("loadusr -W mb2hal"), its file, `config` in `folder`, and more commands.
+ * False when this machine cannot run it: what it printed says why. `until` ends with a pin without a name. */
+bool mb2hal_start(struct process *halrun, const char *folder, const char *load, const char *config,
+                  const char *commands, const struct mb2hal_pin *until);
 /* Wait until all pins of `until` have had their value; the output then lists all pins. */
 void mb2hal_finish(struct process *halrun, const char *folder);
 
