@@ -302,6 +302,7 @@ check-system: all $(SYSTEM_BIN)
 
 bench: all $(BENCH_BIN) ## compare with the peers, as ratios, in one run
 	@tests/bench/run $(BUILDDIR)
+	@tests/bench/modules $(BUILDDIR)
 	@tests/bench/flash $(BUILDDIR)
 
 fuzz: ## run every fuzz harness for FUZZ_SECONDS

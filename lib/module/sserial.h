@@ -20,8 +20,10 @@ struct sserial_field {
     uint16_t in_at, out_at; /* first bit in the interface registers */
     union {
         struct {
-            struct hm2_level *in;        /* [bits], or [1]; of inputs, and of fields for both directions */
-            struct sserial_bit_out *out; /* of outputs */
+            struct hm2_level *in;             /* [bits], or [1]; of inputs, and of fields for both directions */
+            uint32_t turn;                    /* of inputs, see levels.h; 0 = every pin */
+            uint32_t shown[SSLBP_USER_WORDS]; /* levels as the pins have them */
+            struct sserial_bit_out *out;      /* of outputs */
         } bit;
         struct {
             hm2_float_t *value, *scalemax, *maxlim, *minlim;

@@ -9,12 +9,19 @@
 /* ---- inputs -------------------------------------------------------------------------------------------------------
  */
 
+/* The host writes pins of both directions, too, so those are written in every cycle. */
 static void take_bits(struct sserial_field *const field, const uint32_t *const words)
 {
+    const bool all = field->as.bit.turn == 0 || field->direction != SSLBP_INPUT;
+    const uint32_t turn = all ? UINT32_MAX : field->as.bit.turn;
+    field->as.bit.turn = field->as.bit.turn == 0 ? HM2_FIRST_TURN : hm2_next_turn(field->as.bit.turn);
     for (unsigned done = 0; done < field->bits; done += 32u) {
         const unsigned count = field->bits - done < 32u ? field->bits - done : 32u;
         const uint32_t word = (uint32_t)sslbp_get_bits(words, field->in_at + done, count);
-        hm2_show_levels(field->as.bit.in + done, word, count < 32u ? (1u << count) - 1u : UINT32_MAX);
+        uint32_t *const shown = &field->as.bit.shown[done / 32u];
+        const uint32_t which = (word ^ *shown) | turn;
+        *shown = word;
+        hm2_show_levels(field->as.bit.in + done, word, count < 32u ? which & ((1u << count) - 1u) : which);
     }
 }
 
@@ -121,9 +128,12 @@ static bool level(const struct sserial_field *const field, const unsigned bit)
 static void put_bits(const struct sserial_field *const field, uint32_t *const words, const struct place *const place)
 {
     (void)place;
-    for (unsigned i = 0; i < field->bits; i++) {
-        const unsigned at = field->out_at + i;
-        words[at / 32u] |= (uint32_t)level(field, i) << at % 32u;
+    for (unsigned done = 0; done < field->bits; done += 32u) {
+        const unsigned count = field->bits - done < 32u ? field->bits - done : 32u;
+        uint32_t word = 0;
+        for (unsigned i = count; i-- > 0;)
+            word = word << 1 | level(field, done + i);
+        sslbp_put_bits(words, field->out_at + done, count, word);
     }
 }
 

@@ -73,10 +73,16 @@ void sslbp_engine_restart(struct sslbp_engine *const engine)
     enter(engine, SSLBP_STEP_OFF, engine->since_ns);
 }
 
+/* Behind the highest channel with a remote; those beyond are never started, lost or counted. */
+static unsigned channel_end(const struct sslbp_engine *const engine)
+{
+    return engine->mask ? 32u - (unsigned)__builtin_clz(engine->mask) : 0;
+}
+
 static unsigned started(const struct sslbp_engine *const engine, const bool lost_too)
 {
     unsigned mask = 0;
-    for (unsigned i = 0; i < SSLBP_CHANNELS; i++)
+    for (unsigned i = 0, end = channel_end(engine); i < end; i++)
         if (engine->channel[i].started && (lost_too || !engine->channel[i].lost))
             mask |= 1u << i;
     return mask;
@@ -129,7 +135,7 @@ static void take_transfer(struct sslbp_engine *const engine, struct sslbp_channe
 static void take_cs(struct sslbp_engine *const engine, const struct sslbp_reply *const reply)
 {
     const unsigned mask = engine->mask;
-    for (unsigned i = 0; i < SSLBP_CHANNELS; i++)
+    for (unsigned i = 0, end = channel_end(engine); i < end; i++)
         if (mask >> i & 1u)
             engine->channel[i].cs = reply->cs[i];
 }
@@ -145,7 +151,7 @@ static unsigned take_doit(struct sslbp_engine *const engine, const struct sslbp_
     engine->exchanged = 0;
     engine->doit_ns = reply->now_ns - engine->sent_ns;
     take_cs(engine, reply);
-    for (unsigned i = 0; i < SSLBP_CHANNELS; i++)
+    for (unsigned i = 0, end = channel_end(engine); i < end; i++)
         if (exchanged >> i & 1u)
             take_transfer(engine, &engine->channel[i], failed >> i & 1u, wish);
     return exchanged & ~failed & started(engine, false);
@@ -160,7 +166,7 @@ static void take_start(struct sslbp_engine *const engine, const struct sslbp_rep
 {
     const unsigned mask = engine->mask, failed = reply->data & mask;
     take_cs(engine, reply);
-    for (unsigned i = 0; i < SSLBP_CHANNELS; i++) {
+    for (unsigned i = 0, end = channel_end(engine); i < end; i++) {
         struct sslbp_channel *const channel = &engine->channel[i];
         if (!(mask >> i & 1u))
             continue;
@@ -272,7 +278,7 @@ unsigned sslbp_engine_take(struct sslbp_engine *const engine, const struct sslbp
 {
     engine->fresh = true;
     engine->clear = (reply->command & 0xFFFFu) == 0;
-    for (unsigned i = 0; i < SSLBP_CHANNELS; i++)
+    for (unsigned i = 0, end = channel_end(engine); i < end; i++)
         engine->channel[i].event = SSLBP_EVENT_NONE;
     const bool certain = is_certain(engine, reply);
     engine->age = SSLBP_AGE_KNOWN;
@@ -319,7 +325,7 @@ static void restart_soon(struct sslbp_engine *const engine, const int64_t now_ns
  * concerns all remotes of the port, at the earliest when the back-off has passed. */
 static void bring_back(struct sslbp_engine *const engine, const struct sslbp_wish *const wish)
 {
-    for (unsigned i = 0; i < SSLBP_CHANNELS; i++) {
+    for (unsigned i = 0, end = channel_end(engine); i < end; i++) {
         struct sslbp_channel *const channel = &engine->channel[i];
         if (!channel->lost || !channel->started || channel->good < PROOF_TRANSFERS)
             continue;
@@ -337,7 +343,7 @@ static void bring_back(struct sslbp_engine *const engine, const struct sslbp_wis
 
 static bool any_lost(const struct sslbp_engine *const engine)
 {
-    for (unsigned i = 0; i < SSLBP_CHANNELS; i++)
+    for (unsigned i = 0, end = channel_end(engine); i < end; i++)
         if (engine->channel[i].lost && engine->channel[i].started)
             return true;
     return false;
@@ -346,7 +352,7 @@ static bool any_lost(const struct sslbp_engine *const engine)
 static void leak_all(struct sslbp_engine *const engine, const uint32_t by)
 {
     leak(&engine->bucket, by);
-    for (unsigned i = 0; i < SSLBP_CHANNELS; i++)
+    for (unsigned i = 0, end = channel_end(engine); i < end; i++)
         leak(&engine->channel[i].bucket, by);
 }
 
@@ -508,7 +514,7 @@ enum sslbp_port_state sslbp_engine_state(const struct sslbp_engine *const engine
 uint32_t sslbp_engine_faults(const struct sslbp_engine *const engine)
 {
     uint32_t most = engine->bucket;
-    for (unsigned i = 0; i < SSLBP_CHANNELS; i++)
+    for (unsigned i = 0, end = channel_end(engine); i < end; i++)
         if (engine->channel[i].bucket > most)
             most = engine->channel[i].bucket;
     return most;

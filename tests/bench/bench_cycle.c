@@ -203,6 +203,9 @@ static void put_to_work(const char *const prefix, const unsigned card)
     command(text);
     enable_all(prefix, "stepgen");
     enable_all(prefix, "pwmgen");
+    snprintf(text, sizeof text, "%s.sserial.port-0.fault-inc", prefix);
+    if (hh_table_find(&hh_host()->params, text))
+        setp(prefix, "sserial.port-0.fault-inc", "0");
 }
 
 static uintptr_t code_of(const char *const prefix, const char *const suffix)

@@ -187,7 +187,7 @@ static const struct way {
 
 static void connect_to(const struct sockaddr_in *const peer)
 {
-    struct sockaddr_in own;
+    struct sockaddr_in own = {0};
     socklen_t size = sizeof own;
     io.fd = socket(AF_INET, SOCK_DGRAM, 0);
     if (io.fd < 0 || connect(io.fd, (const struct sockaddr *)peer, sizeof *peer) != 0 ||

@@ -197,6 +197,29 @@ static void values_go_both_ways(void **state)
     assert_true(servo_get(f, "sserial.port-0.doit-us") > 100 && servo_get(f, "sserial.port-0.doit-us") < 1000);
 }
 
+/* A host may link a pin at any time, to a signal that has another level. */
+static void inputs_that_never_change_are_written_in_turns(void **state)
+{
+    struct fixture *const f = *state;
+    char name[32];
+    plug(f);
+    load(f, "sserial_port_0=30xxxxxx");
+    run(f);
+    assert_int_equal(remote_set(remote(f, FIELD_IO), "Input", 0xFFFFFFFF), 0);
+    cycles(f, 4);
+    for (unsigned input = 0; input < 32; input++) {
+        (void)snprintf(name, sizeof name, "7i77.0.0.input-%02u", input);
+        assert_int_equal(get(f, name), 1);
+        set(f, name, 0);
+    }
+    cycles(f, 33);
+    for (unsigned input = 0; input < 32; input++) {
+        (void)snprintf(name, sizeof name, "7i77.0.0.input-%02u", input);
+        if (get(f, name) != 1)
+            fail_msg("%s was not written", name);
+    }
+}
+
 static void a_counter_accumulates_past_its_width(void **state)
 {
     struct servo_rig *const f = *state;
@@ -630,6 +653,7 @@ int main(void)
         TEST(channels_that_nobody_asked_for_are_passed_over_in_silence),
         TEST(serial_numbers_name_remotes_on_request),
         TEST(values_go_both_ways),
+        TEST(inputs_that_never_change_are_written_in_turns),
         TEST(a_counter_accumulates_past_its_width),
         TEST(run_stops_and_starts_the_port),
         TEST(a_changed_parameter_is_written_when_the_port_starts_again),
