@@ -82,6 +82,7 @@ struct unit {
     double way_phase; /* where the channels' ways began */
     /* What comes, and when: SIM_NEVER = not at all. */
     int64_t excited_clk; /* first edge of the excitation */
+    int64_t ready_clk;   /* the program takes no step before */
     int64_t status_clk, sample_clk, step_clk, answer_clk;
     bool stopped, waiting, about_word;
     uint32_t command, value, data, read_data, status;
@@ -187,7 +188,8 @@ static void step_channel(struct unit *const u, const unsigned number, const int6
 static void plan_step(struct unit *const u, const int64_t clk)
 {
     const double offset = 0.5 + STEP_CLK / (double)u->sine.period;
-    const double phase = floor(phase_at(&u->sine, clk) - offset) + 1 + offset;
+    const double now = phase_at(&u->sine, clk > u->ready_clk ? clk : u->ready_clk);
+    const double phase = floor(now - offset) + 1 + offset;
     u->step_clk = clk_of_phase(&u->sine, phase);
     u->sample_clk = clk_of_phase(&u->sine, phase - 0.5);
 }
@@ -220,7 +222,8 @@ static void start_program(struct unit *const u, const int64_t clk)
     u->stopped = false;
     u->value = u->read_data = 0;
     u->status_clk = clk + STATUS_CLK;
-    plan_step(u, clk + READY_CLK);
+    u->ready_clk = clk + READY_CLK;
+    plan_step(u, clk);
 }
 
 static int64_t word_answer_clk(const struct unit *const u, const int64_t clk)
