@@ -186,6 +186,9 @@ struct hm2_board {
     struct hm2_cycle cycle;   /* as the modules are told */
     uint32_t writes;          /* since start() or since the card came back */
     int64_t write_ns;         /* when the last write was sent, valid with writes > 0 */
+    int64_t unpacked_ns;      /* now_ns of the last unpack */
+    int64_t pet_ns;           /* when the first write after it was sent */
+    bool petted;              /* there was one */
     int64_t write_gap_ns;     /* longest time between two writes since the last good reply */
     uint32_t cycles;          /* of read */
     uint32_t last_loss_cycle; /* when a request or a write was lost */

@@ -30,6 +30,7 @@ struct hm2_cycle *board_cycle(struct hm2_board *const board, const int64_t now_n
     }
     cycle->now_ns = now_ns;
     cycle->age_s = 0.0;
+    cycle->undriven = 0.0;
     cycle->writes = board->writes;
     cycle->bitten = bitten;
     return cycle;
@@ -242,6 +243,16 @@ static void date_back(const struct hm2_board *const board, struct hm2_cycle *con
     cycle->age_s = age_ns > 0 ? (double)age_ns * 1e-9 : 0.0;
 }
 
+/* When the card bit follows from the write behind the last unpack. That later ones were in time for it is not known;
+ * when packets are lost, most are not. */
+HM2_RARE static double undriven_since_bite(const struct hm2_board *const board, const int64_t now_ns)
+{
+    const int64_t pet_ns = board->petted ? board->pet_ns : board->unpacked_ns;
+    const double bitten_ns = (double)(now_ns - pet_ns - hm2_watchdog_timeout_ns(board->watchdog)),
+                 all_ns = (double)(now_ns - board->unpacked_ns);
+    return bitten_ns <= 0.0 || all_ns <= 0.0 ? 0.0 : bitten_ns < all_ns ? bitten_ns / all_ns : 1.0;
+}
+
 static void unpack_all(struct hm2_board *const board)
 {
     const bool bitten = hm2_watchdog_bitten(board->watchdog); /* as the cycle before has found */
@@ -249,7 +260,13 @@ static void unpack_all(struct hm2_board *const board)
     cycle->received_ns = board->received_ns;
     if (board->pipeline.turned)
         date_back(board, cycle);
+    if (bitten)
+        cycle->undriven = 1.0;
+    else if (hm2_watchdog_bites(board->watchdog))
+        cycle->undriven = undriven_since_bite(board, cycle->now_ns);
     call_all(&board->unpacks, cycle);
+    board->unpacked_ns = cycle->now_ns;
+    board->petted = false;
     *board->points->data_age = 0;
     if (bitten || board->bitten)
         board_stay_bitten(board, bitten);
@@ -433,6 +450,8 @@ void hm2_board_write(struct hm2_board *const board, const int64_t period_ns)
     if (board->writes > 0 && now_ns - board->write_ns > board->write_gap_ns)
         board->write_gap_ns = now_ns - board->write_ns;
     board->write_ns = now_ns;
+    board->pet_ns = board->petted ? board->pet_ns : now_ns;
+    board->petted = true;
     board->writes++;
     if (link_send(board->link, bytes, len) < 0) {
         hm2_plan_write_failed(board->plan);

@@ -200,6 +200,16 @@ static void carry_forward(struct stepgen_module *const ctx, const unsigned insta
     }
 }
 
+/* A generator goes on while the outputs are off: steps that it counts then reach no motor. Without this the axis, told
+ * that it is there, would go back over them. The rate is that of one write but for the first period. */
+HM2_RARE static void leave_undriven(struct stepgen_module *const ctx, const unsigned instances, const double undriven)
+{
+    for (struct stepgen *gen = ctx->generator, *const end = gen + instances; gen < end; gen++) {
+        const double moved = hm2_delta32(hm2_window_get(&ctx->accumulators, gen->number), gen->accumulator);
+        gen->accumulator += (uint32_t)hm2_trunc_s32(moved * undriven);
+    }
+}
+
 static inline void unpack_all(struct stepgen_module *const ctx, const unsigned instances, const bool has_latch)
 {
     const uint8_t *accumulators = ctx->accumulators.bytes;
@@ -225,6 +235,8 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     struct stepgen_module *const ctx = module->context;
     if (!ctx)
         return;
+    if (cycle->undriven > 0.0)
+        leave_undriven(ctx, module->instances, cycle->undriven);
     if (ctx->has_latch)
         unpack_all(ctx, module->instances, true);
     else

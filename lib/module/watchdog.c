@@ -78,6 +78,13 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
     return err;
 }
 
+/* Until the card has taken the zero, its status still tells of the old bite. */
+static bool tells_of_a_bite(const struct watchdog *const ctx)
+{
+    return (hm2_window_get(&ctx->status, 0) & STATUS_BITTEN) &&
+           (ctx->dog == DOG_WATCHES || (ctx->dog == DOG_IS_CLEARED && hm2_section_confirmed(&ctx->status_zero)));
+}
+
 HM2_RARE static void bite(struct watchdog *const ctx)
 {
     ctx->dog = DOG_HAS_BITTEN;
@@ -90,13 +97,11 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     (void)cycle;
     if (ctx->dog == DOG_HAS_BITTEN)
         return;
-    /* Until the card has taken the zero, its status still tells of the old bite. */
-    if (ctx->dog == DOG_IS_CLEARED && !hm2_section_confirmed(&ctx->status_zero))
-        return;
-    ctx->dog = DOG_WATCHES;
-    if (hm2_window_get(&ctx->status, 0) & STATUS_BITTEN) {
+    if (tells_of_a_bite(ctx)) {
         bite(ctx);
         hm2_notice(module, HM2_NOTICE_WATCHDOG_BIT, 0, 0.0);
+    } else if (ctx->dog == DOG_IS_CLEARED && hm2_section_confirmed(&ctx->status_zero)) {
+        ctx->dog = DOG_WATCHES;
     }
 }
 
@@ -138,6 +143,17 @@ bool hm2_watchdog_bitten(const struct hm2_module *const module)
 {
     const struct watchdog *const ctx = module ? module->context : NULL;
     return ctx && ctx->dog == DOG_HAS_BITTEN && *ctx->has_bit;
+}
+
+bool hm2_watchdog_bites(const struct hm2_module *const module)
+{
+    return module && module->context && tells_of_a_bite(module->context);
+}
+
+int64_t hm2_watchdog_timeout_ns(const struct hm2_module *const module)
+{
+    const struct watchdog *const ctx = module ? module->context : NULL;
+    return ctx ? ctx->timer_for_ns : 0;
 }
 
 void hm2_watchdog_raise(struct hm2_module *const module)

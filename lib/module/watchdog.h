@@ -11,6 +11,10 @@
 /* The dog has bitten and has_bit is still 1: for struct hm2_cycle. Ask before the modules are packed: when the user has
  * just cleared has_bit this is false, and the same write brings everything back. */
 bool hm2_watchdog_bitten(const struct hm2_module *module);
+/* The reply that is about to be unpacked is the first to tell of a bite. */
+bool hm2_watchdog_bites(const struct hm2_module *module);
+/* Time without a write after which it bites. */
+int64_t hm2_watchdog_timeout_ns(const struct hm2_module *module);
 /* Treat the card as bitten (it lost its power and came back): has_bit becomes 1. */
 void hm2_watchdog_raise(struct hm2_module *module);
 /* As if a person had set has_bit to 0. */

@@ -168,6 +168,63 @@ static void a_held_up_thread_makes_the_watchdog_bite_and_says_so(void **state)
     assert_true(servo_get(f, "watchdog.has_bit") == 0);
 }
 
+struct motor {
+    struct sim_card *card;
+    int step, direction; /* watches */
+    int steps;
+};
+
+/* A pad that floats is no step: this is what a drive gets. */
+static void count_step(void *context, int64_t clk, unsigned ps, unsigned watch, enum sim_level level)
+{
+    struct motor *const motor = context;
+    (void)clk;
+    (void)ps;
+    if ((int)watch == motor->step && level == SIM_HIGH)
+        motor->steps += sim_card_watched(motor->card, (unsigned)motor->direction) == SIM_HIGH ? -1 : 1;
+}
+
+static void attach_motor(const struct fixture *const f, struct motor *const motor)
+{
+    *motor = (struct motor){.card = f->card};
+    motor->step = sim_card_watch_pad(f->card, STEP_IO);
+    motor->direction = sim_card_watch_pad(f->card, STEP_IO + 1);
+    assert_true(motor->step >= 0 && motor->direction >= 0);
+    sim_card_on_edge(f->card, count_step, motor);
+}
+
+/* With the time between bite and next reply the generator counts ten times what the motor did. */
+static void after_a_bite_the_position_is_that_of_the_motor_and_it_does_not_go_back(void **state)
+{
+    struct fixture *const f = *state;
+    struct motor motor;
+    load(f, NULL);
+    set(f, "stepgen.00.position-scale", 1000);
+    set(f, "stepgen.00.steplen", 1000);
+    set(f, "stepgen.00.stepspace", 1000);
+    set(f, "stepgen.00.maxaccel", 0);
+    set(f, "stepgen.00.enable", 1);
+    cycles(f, 10);
+    attach_motor(f, &motor);
+    for (unsigned i = 0; i < 200; i++) {
+        set(f, "stepgen.00.position-cmd", i * 0.02);
+        cycle(f);
+    }
+    sim_net_sleep_until(f->net, link_now_ns(f->link) + 60 * PERIOD_NS);
+    cycles(f, 3);
+    assert_true(get(f, "watchdog.has_bit") == 1);
+    assert_in_range(motor.steps, 4000, 4150); /* 5 ms more */
+    const double position = get(f, "stepgen.00.position-fb");
+    if (position < motor.steps * 0.001 - 0.025 || position > motor.steps * 0.001 + 0.025)
+        fail_msg("position-fb is %g, the motor is at %g", position, motor.steps * 0.001);
+    const int steps = motor.steps;
+    set(f, "stepgen.00.position-cmd", position);
+    set(f, "watchdog.has_bit", 0);
+    cycles(f, 100);
+    assert_in_range(motor.steps, steps - 1, steps + 1);
+    sim_card_on_edge(f->card, NULL, NULL);
+}
+
 /* The card needs longer to configure its FPGA than the error level allows: a person clears io_error. */
 static void power_cycle(struct servo_rig *const f)
 {
@@ -287,6 +344,7 @@ int main(void)
         TEST(outputs_are_inactive_until_the_first_write_and_after_stop),
         TEST(a_step_generator_arrives_where_it_is_sent),
         TEST(a_held_up_thread_makes_the_watchdog_bite_and_says_so),
+        TEST(after_a_bite_the_position_is_that_of_the_motor_and_it_does_not_go_back),
         TEST(a_power_cycle_is_survived_with_outputs_off_until_a_person_agrees),
         TEST(encoder_positions_do_not_jump_when_the_power_fails),
         TEST(a_wait_that_another_program_left_on_the_card_does_not_hold_set_up_up),

@@ -666,6 +666,29 @@ static void a_bite_stops_the_generators_and_they_start_from_rest(void **state)
     rig_free(bench.rig);
 }
 
+static void steps_that_reached_no_motor_are_not_counted(void **state)
+{
+    (void)state;
+    struct bench bench = bench_open(rig_image_7i96s(), "num_stepgens=1");
+    run(&bench);
+    bench.accumulator[0] = 100 * (INT64_C(1) << 32);
+    run(&bench);
+    assert_true(get(&bench, "position-fb") == 100.0);
+    bench.accumulator[0] = 200 * (INT64_C(1) << 32);
+    bench.rig->cycle.undriven = 0.75; /* bitten meanwhile */
+    run(&bench);
+    assert_true(get(&bench, "position-fb") == 125.0);
+    bench.accumulator[0] = -300 * (INT64_C(1) << 32);
+    bench.rig->cycle.undriven = 1.0;
+    run(&bench);
+    assert_true(get(&bench, "position-fb") == 125.0);
+    bench.accumulator[0] = -290 * (INT64_C(1) << 32);
+    bench.rig->cycle.undriven = 0.0;
+    run(&bench);
+    assert_true(get(&bench, "position-fb") == 135.0);
+    rig_free(bench.rig);
+}
+
 static void hostile_pins_never_leave_the_limits(void **state)
 {
     (void)state;
@@ -750,6 +773,7 @@ int main(void)
         cmocka_unit_test(position_mode_is_the_documented_algorithm),
         cmocka_unit_test(a_command_beyond_the_limit_is_reported),
         cmocka_unit_test(a_bite_stops_the_generators_and_they_start_from_rest),
+        cmocka_unit_test(steps_that_reached_no_motor_are_not_counted),
         cmocka_unit_test(hostile_pins_never_leave_the_limits),
         cmocka_unit_test(a_command_that_is_no_number_holds_the_position),
         cmocka_unit_test(position_mode_takes_over_from_velocity_mode_without_a_jump),
