@@ -14,6 +14,7 @@
 #define CLEAR           0x80010000u
 #define BLOCKS          6u
 #define WORDS           63u
+#define SMALL_WORDS     16u
 #define FRAMES          16u
 #define QUEUED_FRAMES   12u
 #define MODE_FRAMES(m)  ((m) >> 16 & 0x1Fu)
@@ -226,17 +227,22 @@ static bool may_send(const struct pktuart *const p)
 {
     if (!hm2_section_confirmed(&p->tx_mode) || !hm2_section_confirmed(&p->tx_rate))
         return false;
+    if (p->queued + p->rx.crowd.frames >= FRAMES - 1u)
+        return false;
     if (p->port.settings.drive == HM2_DRIVE_AUTO)
         return p->queued == 0 && !(p->tx_mode_seen & MODE_ACTIVE);
     return p->port.settings.drive == HM2_DRIVE_ON && p->queued < QUEUED_FRAMES;
 }
 
 /* What is sent may come back, at once or as an answer of the same length: the receiver has room for it all, however
- * late the next cycle is. */
+ * late the next cycle is. Frames have few places, so a small room is not filled with a part of what waits. */
 static unsigned words_to_send(const struct pktuart *const p)
 {
     const unsigned there = p->queued_words + pkt_rx_most_words(&p->rx, p->port.now_ns);
     const unsigned free_words = there < PKT_BUFFER_WORDS ? PKT_BUFFER_WORDS - there : 0;
+    const unsigned waiting_words = (ring_used(&p->port.tx) + 3u) / 4u;
+    if (free_words < SMALL_WORDS && free_words < waiting_words)
+        return 0;
     return free_words < WORDS ? free_words : WORDS;
 }
 

@@ -38,7 +38,9 @@ static void see_frames(struct pkt_crowd *const crowd, const struct pkt_sight *co
 void pkt_crowd_see(struct pkt_crowd *const crowd, const struct pkt_sight *const sight)
 {
     see_frames(crowd, sight);
-    if (sight->still || sight->taken > 0 || sight->frames > 0)
+    if (sight->cleared)
+        crowd->known_ns = crowd->before_ns;
+    if (sight->still || sight->cleared || sight->taken > 0 || sight->frames > 0)
         crowd->run_ns = sight->received_ns;
     crowd->run_seen_ns = sight->sent_ns;
     crowd->before_ns = sight->sent_ns;

@@ -21,6 +21,7 @@ struct pkt_sight {
     int64_t sent_ns, received_ns;
     unsigned taken, frames; /* sizes that came with it; frames whose sizes are still in the card */
     bool still;             /* the line rests, and all sizes have been taken */
+    bool cleared;           /* since the request before, or not yet */
 };
 
 struct pkt_crowd {

@@ -315,7 +315,8 @@ static void look_at_crowd(struct pkt_rx *const rx, const struct hm2_serial *cons
                                     .received_ns = port->now_ns,
                                     .taken = sizes,
                                     .frames = MODE_FRAMES(rx->mode),
-                                    .still = rx->still};
+                                    .still = rx->still,
+                                    .cleared = rx->clearing};
     pkt_crowd_see(&rx->crowd, &sight);
 }
 

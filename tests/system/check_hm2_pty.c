@@ -45,7 +45,7 @@ static void start(const struct line *const line)
     talk_do(&hal,
             "loadrt hm2_lbp16 board_ip=%s\nloadrt hm2_pty ports=hm2_7i80.0.%s links=%s %s\n"
             "loadrt threads name1=servo period1=1000000\naddf hm2_7i80.0.read servo\naddf hm2_7i80.0.write servo\n"
-            "setp hm2_7i80.0.packet-read-timeout 20000000\nsetp hm2_7i80.0.packet-error-limit 1000000\n"
+            "setp hm2_7i80.0.packet-read-timeout 500000000\nsetp hm2_7i80.0.packet-error-limit 1000000\n"
             "setp hm2_7i80.0.watchdog.timeout_ns 4000000000\nstart\nrun 0.3",
             sim.address[0], line->port, terminal, line->options);
 }
