@@ -548,6 +548,28 @@ START_TEST(keeps_away_from_the_flash_of_a_card_in_use)
 }
 END_TEST
 
+/* A program that reads JSON gets an object in any case, and the sentences in it. */
+START_TEST(failures_are_json_too)
+{
+    char both[40];
+    snprintf(both, sizeof both, "%s,%s", sim.address[0], sim.address[1]);
+    run(REFUSED, "--device", "7i96", "--addr", sim.address[0], "--json");
+    printed("\"done\": false, \"status\": 3, \"error\": \"the card at ");
+    run(LOST, "--addr", "127.255.255.254", "--json");
+    printed("\"status\": 4, \"error\": \"no card answers LBP16");
+    run(REFUSED, "--addr", sim.address[1], "--write", image_7i96s(1), "--json");
+    printed("\"error\": \"Error: wrong bitfile destination device: T20F256, should be 6slx9tqg144.");
+    run(REFUSED, "--device", "7i93", "--addr", both, "--json");
+    printed("\"device\": \"7I96S\", \"done\": false, \"status\": 3");
+    printed("\"device\": \"7I93\", \"name\": \"7I93\"");
+    run(REFUSED, "--info", "/nonexistent", "--json");
+    printed("\"status\": 3, \"error\": \"Can't open file /nonexistent");
+    const char *const image = image_7i96s(2);
+    const char *const text = run(FAILED, "--addr", sim.address[0], "--verify", image, "--json");
+    ck_assert_ptr_null(strstr(strstr(text, "difference_at"), "\"status\"")); /* one object, not two */
+}
+END_TEST
+
 START_TEST(works_on_many_cards_and_finds_them)
 {
     char both[40], line[96];
@@ -600,6 +622,7 @@ int main(void)
     tcase_add_test(tests, reads_and_never_writes_a_card_whose_chip_it_does_not_know);
     tcase_add_test(tests, says_which_card_and_which_part_before_it_acts);
     tcase_add_test(tests, keeps_away_from_the_flash_of_a_card_in_use);
+    tcase_add_test(tests, failures_are_json_too);
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
     suite_add_tcase(suite, tests);

@@ -64,6 +64,9 @@ void json_array(const struct cli *cli, const char *key);
 void json_object(const struct cli *cli); /* an element of an array */
 void json_close(const struct cli *cli, char bracket);
 void json_end(const struct cli *cli);
+/* What goes to stderr is kept, and printed as an object of its own when a command fails that printed none. */
+void json_problem(const char *text);
+void json_failure(const struct cli *cli, int status);
 /* The object of a finished command. */
 void json_result(const struct cli *cli, const char *action);
 

@@ -10,6 +10,8 @@
 
 static bool started[MAX_DEPTH];
 static unsigned depth;
+static bool printed;        /* an object */
+static char problems[4096]; /* what was said on stderr, for the object of a command that fails */
 
 static void comma(void)
 {
@@ -96,8 +98,28 @@ void json_close(const struct cli *const cli, const char bracket)
 void json_end(const struct cli *const cli)
 {
     json_close(cli, '}');
-    if (cli->json)
-        putchar('\n');
+    if (!cli->json)
+        return;
+    putchar('\n');
+    printed = true;
+}
+
+void json_problem(const char *const text)
+{
+    const size_t len = strlen(problems), more = strlen(text);
+    const int whole = (int)(more > 0 && text[more - 1] == '\n' ? more - 1 : more);
+    snprintf(problems + len, sizeof problems - len, "%s%.*s", len > 0 ? "\n" : "", whole, text);
+}
+
+void json_failure(const struct cli *const cli, const int status)
+{
+    if (!cli->json || printed)
+        return;
+    json_begin(cli);
+    json_bool(cli, "done", false);
+    json_number(cli, "status", status);
+    json_text(cli, "error", problems);
+    json_end(cli);
 }
 
 void json_result(const struct cli *const cli, const char *const action)

@@ -175,21 +175,24 @@ static int status_of(const int err)
 int report(struct cli *const cli, const int err)
 {
     fflush(stdout);
-    if (cli->diag.len > 0)
+    if (cli->diag.len > 0) {
         fprintf(stderr, "hm2flash: %s%s%s", cli->many ? cli->address : "", cli->many ? ": " : "", cli->diag.text);
+        json_problem(cli->diag.text);
+    }
     hm2_diag_clear(&cli->diag);
     return status_of(err);
 }
 
 int complain(const struct cli *const cli, const int status, const char *const format, ...)
 {
+    char text[1024];
     va_list args;
     fflush(stdout);
-    fprintf(stderr, "hm2flash: %s%s", cli->many ? cli->address : "", cli->many ? ": " : "");
     va_start(args, format);
-    vfprintf(stderr, format, args);
+    vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    fputc('\n', stderr);
+    fprintf(stderr, "hm2flash: %s%s%s\n", cli->many ? cli->address : "", cli->many ? ": " : "", text);
+    json_problem(text);
     return status;
 }
 
@@ -324,11 +327,11 @@ struct request {
 static int run_one(struct cli *const cli, const struct request *const request)
 {
     const struct command *const command = request->command;
-    if (command && !command->needs_card)
-        return command->run(cli, request->argument);
-    int status = open_card(cli);
+    int status = !command || command->needs_card ? open_card(cli) : DONE;
     if (status == DONE)
         status = command ? command->run(cli, request->argument) : do_identify(cli, NULL);
+    if (status != DONE)
+        json_failure(cli, status);
     close_card(cli);
     return fflush(stdout) == 0 ? status : FAILED;
 }
