@@ -133,9 +133,9 @@ static int export_function(struct bus *const b, const char *const prefix, const 
 
 /* ---- beside the cycle -------------------------------------------------------------------------------------------- */
 
-static void ask_controller(struct bus *const b)
+static void ask_controller(struct bus *const b, const bool is_there)
 {
-    const enum controller_state state = controller_state(b->interface);
+    const enum controller_state state = is_there ? controller_state(b->interface) : CONTROLLER_UNKNOWN;
     const bool off = state == CONTROLLER_BUS_OFF;
     if (off != b->was_off)
         hm2_can_tell_bus_off(b->can, off);
@@ -173,36 +173,38 @@ static int open_socket(struct bus *const b, struct hm2_can_bus **const socket, s
     return err;
 }
 
-/* An interface that was unplugged and plugged in has a new index, and the socket is none of its own. */
-static void look_for_interface(struct bus *const b)
+/* An interface that was unplugged and plugged in has a new index, and the socket is none of its own. Whether there is
+ * one. */
+static bool look_for_interface(struct bus *const b)
 {
     const unsigned index = if_nametoindex(b->interface), before = b->index;
     struct hm2_can_bus *socket;
     struct hm2_diag diag;
     hm2_can_close_old(b->can);
     if (index == 0 || index == before)
-        return;
+        return index != 0;
     hm2_diag_clear(&diag);
     if (open_socket(b, &socket, &diag) == 0) {
         hm2_can_replace_bus(b->can, socket);
         b->has_controller = controller_state(b->interface) != CONTROLLER_UNKNOWN;
         ++*b->points->reopened;
-        return;
+        return true;
     }
     b->index = before; /* tried again: it may not be set up yet */
     if (index != b->refused_index)
         messenger_print_diag("can_io", b->interface, &diag);
     b->refused_index = index;
+    return true;
 }
 
 static void supervise(void)
 {
     for (unsigned i = 0; i < bus_count; i++) {
         struct bus *const b = &buses[i];
-        look_for_interface(b);
-        *b->points->link_up = controller_link_up(b->interface);
+        const bool is_there = look_for_interface(b);
+        *b->points->link_up = is_there && controller_link_up(b->interface);
         if (b->has_controller)
-            ask_controller(b);
+            ask_controller(b, is_there);
         if (must_restart(b))
             restart(b);
     }

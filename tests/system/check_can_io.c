@@ -8,8 +8,8 @@
 
 #include "process.h"
 
-#define LIMIT_S  "800"
-#define LIMIT_MS 840000
+#define LIMIT_S  "500"
+#define LIMIT_MS 560000
 #define SKIPPED  77
 
 static const char *const cases[] = {

@@ -33,6 +33,7 @@ class Adapter:
         return self
 
     def __exit__(self, *error):
+        subprocess.run(["ip", "link", "set", self.interface, "down"], check=False)
         os.close(self.driver)  # which removes the interface
         os.close(self.line)
         self.reader.join()
