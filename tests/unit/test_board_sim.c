@@ -184,7 +184,7 @@ static void count_step(void *context, int64_t clk, unsigned ps, unsigned watch, 
         motor->steps += sim_card_watched(motor->card, (unsigned)motor->direction) == SIM_HIGH ? -1 : 1;
 }
 
-static void attach_motor(const struct fixture *const f, struct motor *const motor)
+static void attach_motor(const struct servo_rig *const f, struct motor *const motor)
 {
     *motor = (struct motor){.card = f->card};
     motor->step = sim_card_watch_pad(f->card, STEP_IO);
@@ -196,31 +196,31 @@ static void attach_motor(const struct fixture *const f, struct motor *const moto
 /* With the time between bite and next reply the generator counts ten times what the motor did. */
 static void after_a_bite_the_position_is_that_of_the_motor_and_it_does_not_go_back(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     struct motor motor;
-    load(f, NULL);
-    set(f, "stepgen.00.position-scale", 1000);
-    set(f, "stepgen.00.steplen", 1000);
-    set(f, "stepgen.00.stepspace", 1000);
-    set(f, "stepgen.00.maxaccel", 0);
-    set(f, "stepgen.00.enable", 1);
-    cycles(f, 10);
+    servo_load(f, NULL);
+    servo_set(f, "stepgen.00.position-scale", 1000);
+    servo_set(f, "stepgen.00.steplen", 1000);
+    servo_set(f, "stepgen.00.stepspace", 1000);
+    servo_set(f, "stepgen.00.maxaccel", 0);
+    servo_set(f, "stepgen.00.enable", 1);
+    servo_cycles(f, 10);
     attach_motor(f, &motor);
     for (unsigned i = 0; i < 200; i++) {
-        set(f, "stepgen.00.position-cmd", i * 0.02);
-        cycle(f);
+        servo_set(f, "stepgen.00.position-cmd", i * 0.02);
+        servo_cycle(f);
     }
     sim_net_sleep_until(f->net, link_now_ns(f->link) + 60 * PERIOD_NS);
-    cycles(f, 3);
-    assert_true(get(f, "watchdog.has_bit") == 1);
+    servo_cycles(f, 3);
+    assert_true(servo_get(f, "watchdog.has_bit") == 1);
     assert_in_range(motor.steps, 4000, 4150); /* 5 ms more */
-    const double position = get(f, "stepgen.00.position-fb");
+    const double position = servo_get(f, "stepgen.00.position-fb");
     if (position < motor.steps * 0.001 - 0.025 || position > motor.steps * 0.001 + 0.025)
         fail_msg("position-fb is %g, the motor is at %g", position, motor.steps * 0.001);
     const int steps = motor.steps;
-    set(f, "stepgen.00.position-cmd", position);
-    set(f, "watchdog.has_bit", 0);
-    cycles(f, 100);
+    servo_set(f, "stepgen.00.position-cmd", position);
+    servo_set(f, "watchdog.has_bit", 0);
+    servo_cycles(f, 100);
     assert_in_range(motor.steps, steps - 1, steps + 1);
     sim_card_on_edge(f->card, NULL, NULL);
 }

@@ -200,22 +200,22 @@ static void values_go_both_ways(void **state)
 /* A host may link a pin at any time, to a signal that has another level. */
 static void inputs_that_never_change_are_written_in_turns(void **state)
 {
-    struct fixture *const f = *state;
+    struct servo_rig *const f = *state;
     char name[32];
     plug(f);
-    load(f, "sserial_port_0=30xxxxxx");
+    servo_load(f, "sserial_port_0=30xxxxxx");
     run(f);
     assert_int_equal(remote_set(remote(f, FIELD_IO), "Input", 0xFFFFFFFF), 0);
-    cycles(f, 4);
+    servo_cycles(f, 4);
     for (unsigned input = 0; input < 32; input++) {
         (void)snprintf(name, sizeof name, "7i77.0.0.input-%02u", input);
-        assert_int_equal(get(f, name), 1);
-        set(f, name, 0);
+        assert_int_equal(servo_get(f, name), 1);
+        servo_set(f, name, 0);
     }
-    cycles(f, 33);
+    servo_cycles(f, 33);
     for (unsigned input = 0; input < 32; input++) {
         (void)snprintf(name, sizeof name, "7i77.0.0.input-%02u", input);
-        if (get(f, name) != 1)
+        if (servo_get(f, name) != 1)
             fail_msg("%s was not written", name);
     }
 }
