@@ -17,7 +17,7 @@
 #define CONFIGURE_START_NS 1000000000 /* FPGA configuration, then the same */
 #define FRAME_LIMIT_BYTES  0x600u     /* longer frames are neither taken nor sent */
 #define SMALLEST_CHIP      0x11u      /* flash tool reference 2.2: room for a boot sector and two areas */
-#define LARGEST_CHIP       0x16u /* one that no table of flash tools has */
+#define LARGEST_CHIP       0x16u      /* one that no table of flash tools has */
 #define FLASH_BYTES_OF(id) (1u << ((id) + 1u))
 #define JUMPERS_FALLBACK   3u /* Efinix (flash tool reference 2.4) */
 #define EFINIX_USER_IMAGE  1u

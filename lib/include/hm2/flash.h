@@ -290,8 +290,8 @@ HM2_API int HM2_MUST_CHECK flash_job_backup(struct flash_job **job, struct flash
                                             const struct flash_options *options, struct hm2_diag *diag);
 HM2_API void flash_job_free(struct flash_job *job);
 
-/* One step: at most one datagram's worth of work with its tries, or one erase. 1 = go on, 0 = done, or an error.
- * Between two steps a caller may stop: see flash_job_between_sectors(). */
+/* One step: a datagram's worth of work with its tries, sixteen of them when only reading, or one erase. 1 = go on, 0 =
+ * done, or an error. Between two steps a caller may stop: see flash_job_between_sectors(). */
 HM2_API int HM2_MUST_CHECK flash_job_step(struct flash_job *job, struct hm2_diag *diag);
 /* All steps; progress (may be NULL) is called after each and returns false to stop, which happens when no sector is
  * half written: HM2_ERR_STATE when nothing was changed yet, else HM2_ERR_IO. */
