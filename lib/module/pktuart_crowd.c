@@ -6,12 +6,14 @@
 #define BITS_A_WORD 40.0   /* start and stop bits included */
 #define FASTEST     1.0625 /* a peer's clock that is off by more is not understood */
 #define NS_PER_S    1e9
-#define WORDS_MAX   1e6 /* of a receiver that nobody has looked at for long */
+#define WORDS_MAX   1e6  /* of a receiver that nobody has looked at for long */
+#define BEGUN_WORDS 32.0 /* a frame that is seen first has had no more of them, for what can be known */
 #define FRAME_WORDS (PKT_FRAME_MODULUS / 4.0)
 
 void pkt_crowd_init(struct pkt_crowd *const crowd, const uint32_t baud)
 {
     crowd->words_per_ns = baud * FASTEST / (BITS_A_WORD * NS_PER_S);
+    crowd->begun_ns = (int64_t)(BEGUN_WORDS / crowd->words_per_ns);
 }
 
 static void drop(struct pkt_crowd *const crowd, const unsigned frames)
@@ -40,8 +42,12 @@ void pkt_crowd_see(struct pkt_crowd *const crowd, const struct pkt_sight *const 
     see_frames(crowd, sight);
     if (sight->cleared)
         crowd->known_ns = crowd->before_ns;
-    if (sight->still || sight->cleared || sight->taken > 0 || sight->frames > 0)
+    const bool runs = !sight->still && !sight->cleared && sight->taken == 0 && sight->frames == 0;
+    if (!runs)
         crowd->run_ns = sight->received_ns;
+    else if (!crowd->runs && crowd->run_ns < sight->sent_ns - crowd->begun_ns)
+        crowd->run_ns = sight->sent_ns - crowd->begun_ns;
+    crowd->runs = runs;
     crowd->run_seen_ns = sight->sent_ns;
     crowd->before_ns = sight->sent_ns;
 }

@@ -30,6 +30,8 @@ struct pkt_crowd {
     int64_t before_ns;                 /* the request before */
     int64_t ended_ns[PKT_MODE_FRAMES]; /* frames of unknown size ended then or later, oldest first */
     unsigned frames;
+    int64_t begun_ns; /* how long a frame that is seen first has been under way, at most that is counted */
+    bool runs;
     int64_t run_ns, run_seen_ns; /* one frame was under way from then to then, at least */
 };
 

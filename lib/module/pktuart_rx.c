@@ -322,8 +322,10 @@ static void look_at_crowd(struct pkt_rx *const rx, const struct hm2_serial *cons
 
 static void take_all(struct pkt_rx *const rx, struct hm2_serial *const port)
 {
-    const unsigned sizes = rx->asked_counts;
+    const unsigned sizes = rx->asked_counts, most = WORD_BYTES * pkt_crowd_words(&rx->crowd, port->now_ns);
     take_state(rx);
+    if (rx->doubt.on && most > rx->doubt.most_bytes)
+        rx->doubt.most_bytes = most;
     if (!rx->hunt.on && !rx->doubt.on && pkt_rx_most_words(rx, port->now_ns) > PKT_BUFFER_WORDS)
         begin_doubt(rx, port->now_ns);
     take_words(rx, port);
