@@ -138,7 +138,20 @@ size_t hm2_serial_waiting(const struct hm2_serial *const port)
 
 struct hm2_serial_counts hm2_serial_counts(const struct hm2_serial *const port)
 {
-    return port->counts;
+    uint32_t values[SERIAL_COUNTS] = {0};
+    struct hm2_serial_counts counts;
+    for (size_t i = 0; i < SERIAL_COUNTS; i++)
+        values[i] = atomic_load_explicit(&port->shown[i], memory_order_relaxed);
+    memcpy(&counts, values, sizeof counts);
+    return counts;
+}
+
+static void show_counts(struct hm2_serial *const port)
+{
+    uint32_t values[SERIAL_COUNTS];
+    memcpy(values, &port->counts, sizeof values);
+    for (size_t i = 0; i < SERIAL_COUNTS; i++)
+        atomic_store_explicit(&port->shown[i], values[i], memory_order_relaxed);
 }
 
 /* ---- the ports of a module ------------------------------------------------------------------------------------------
@@ -217,6 +230,7 @@ void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *cons
         port->ops->take(port);
         if (!port->resend)
             port->sent_bytes = 0;
+        show_counts(port);
     }
 }
 
@@ -228,6 +242,7 @@ void serial_late(struct hm2_module *const module, const uint64_t request, const 
             continue;
         port->now_ns = now_ns;
         port->ops->late(port, request);
+        show_counts(port);
     }
 }
 
@@ -263,5 +278,6 @@ void serial_pack(struct hm2_module *const module, const struct hm2_cycle *const 
         port->resend = false;
         port->ops->ask(port);
         port->awaiting = true;
+        show_counts(port);
     }
 }

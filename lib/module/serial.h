@@ -55,6 +55,8 @@ struct queue_place queue_place(struct queue *queue, unsigned words, unsigned n);
 
 enum { SERIAL_DATA, SERIAL_COUNT, SERIAL_RATE, SERIAL_MODE, SERIAL_REGISTERS };
 
+#define SERIAL_COUNTS (sizeof(struct hm2_serial_counts) / sizeof(uint32_t))
+
 struct hm2_serial {
     const struct serial_ops *ops;
     struct hm2_plan *plan;
@@ -67,7 +69,8 @@ struct hm2_serial {
     int64_t sent_ns, now_ns; /* take: of the request, and of its reply; late and ask: now */
     struct hm2_serial_settings settings;
     struct ring tx, rx;
-    struct hm2_serial_counts counts;
+    struct hm2_serial_counts counts;       /* the cycle's own */
+    _Atomic uint32_t shown[SERIAL_COUNTS]; /* the same, for the other thread */
 };
 
 /* In the order of a cycle; all but the first two are called for open ports only. */

@@ -588,8 +588,9 @@ static int take_flash_option(struct reading *const r, const int option, const ch
     unsigned long jumpers;
     switch (option) {
     case OPT_FLASH_CHIP:
-        return flash_chip_option(value, &flash->id) ? 0
-                                                    : refuse(r, "--flash-chip", value, "2Mb, 4Mb, 8Mb, 16Mb, 32Mb or 64Mb");
+        return flash_chip_option(value, &flash->id)
+                   ? 0
+                   : refuse(r, "--flash-chip", value, "2Mb, 4Mb, 8Mb, 16Mb, 32Mb or 64Mb");
     case OPT_FLASH_TIMES:
         flash->times = sim_flash_times_of(value);
         return flash->times ? 0 : refuse(r, "--flash-times", value, "none, m25p16, m25p16-max, w25q16 or w25q16-max");
