@@ -71,7 +71,7 @@ int main(void)
 {
     Suite *const suite = suite_create("7I65 in LinuxCNC");
     TCase *const tests = tcase_create("LinuxCNC");
-    tcase_set_timeout(tests, LIMIT_MS / 1000 + 20);
+    tcase_set_timeout(tests, LIMIT_MS / 1000.0 + 20);
     tcase_add_test(tests, two_loops_close_over_analog_outputs_and_multiplexed_encoders);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);
