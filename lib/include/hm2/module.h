@@ -31,8 +31,7 @@ struct hm2_cycle {
     double age_s;    /* unpack: what the inputs are older than this cycle; 0 unless pipelined */
     uint32_t writes; /* write cycles since load or since the last restart; 0 = this is the first */
     bool bitten;     /* the card's watchdog has bitten and was not yet cleared: outputs are off */
-    double
-        undriven; /* unpack: of the time since the last unpack the part, 0..1, in which outputs were off for a bite */
+    double undriven; /* unpack: part (0..1) of the time since the last one in which outputs were off after a bite */
 };
 
 /* Conditions a module meets in a cycle that a person should hear about. The board turns them into messages outside
