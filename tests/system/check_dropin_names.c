@@ -17,10 +17,10 @@
 #include <unistd.h>
 
 #include "dropin_table.h"
+#include "linuxcnc_peer.h"
 #include "process.h"
 
 #define PEER_LIMIT_MS 300000 /* for all tries that linuxcnc-peer makes */
-#define CANNOT_RUN    77
 
 #define MAX_OBJECTS 2048u
 
@@ -130,7 +130,6 @@ static bool load(const struct load *const load, const char *const driver)
 {
     const bool theirs_loads = strcmp(driver, "hm2_eth") == 0;
     char folder[256], hal[280], servo[128] = "", text[1024];
-    const char *skip;
     snprintf(folder, sizeof folder, "%s/dropin-names-%s-%s-%s", TEST_BUILD, load->card, load->name, driver);
     ck_assert(mkdir(folder, 0755) == 0 || errno == EEXIST);
     if (load->options[0] && strcmp(load->options[0], "--7i65") == 0)
@@ -143,8 +142,8 @@ static bool load(const struct load *const load, const char *const driver)
              servo_prefix, prefix, prefix);
     write_file(folder, "load.hal", text);
     snprintf(hal, sizeof hal, "%s/load.hal", folder);
-    ck_assert_int_eq(setenv("PEER_MODULES", TEST_BUILD "/linuxcnc", 1), 0);
-    ck_assert_int_eq(setenv("PEER_DRIVER", driver, 1), 0);
+    linuxcnc_tell("PEER_MODULES", TEST_BUILD "/linuxcnc");
+    linuxcnc_tell("PEER_DRIVER", driver);
     const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer",
                                 TEST_BUILD,
                                 folder,
@@ -156,10 +155,8 @@ static bool load(const struct load *const load, const char *const driver)
                                 load->options[3],
                                 NULL};
     const int status = process_run(&run, argv, PEER_LIMIT_MS);
-    if (status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &skip)) {
-        printf("%.*s\n", (int)strcspn(skip, "\n"), skip);
+    if (linuxcnc_skipped(&run))
         return false;
-    }
     if (status != 0) {
         printf("%s\n", run.text);
         fflush(stdout);
@@ -306,24 +303,13 @@ static unsigned count(const struct listing *const listing, const char kind)
     return n;
 }
 
-static bool can_load_ours(void)
-{
-    if (TEST_SANITIZED)
-        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC\n");
-    else if (access(TEST_BUILD "/linuxcnc/hm2_lbp16.so", R_OK) != 0)
-        printf("SKIP: LinuxCNC's headers are not installed (linuxcnc-uspace-dev)\n");
-    else
-        return true;
-    return false;
-}
-
 START_TEST(every_object_of_linuxcncs_driver_exists_in_ours_with_type_direction_and_default)
 {
     const struct load *const l = &loads[_i];
     snprintf(where, sizeof where, "names/%s/%s", l->card, l->name);
     /* Firmware of another name is in the same card: "7i96s_7i77d". */
     snprintf(prefix, sizeof prefix, "hm2_%.*s.0.", (int)strcspn(l->card, "_"), l->card);
-    if (!can_load_ours() || !load(l, "hm2_eth"))
+    if (!linuxcnc_loads_ours() || !load(l, "hm2_eth"))
         return;
     read_listing(&theirs);
     if (!load(l, "hm2_lbp16"))

@@ -10,20 +10,15 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "linuxcnc_peer.h"
 #include "process.h"
 
-#define LIMIT_MS   130000
-#define CANNOT_RUN 77
-#define ERROR      "0.01" /* 10 counts of 1000 a unit */
+#define LIMIT_MS 130000
+#define ERROR    "0.01" /* 10 counts of 1000 a unit */
 
 static struct process run;
 
-static void set(const char *const name, const char *const value)
-{
-    ck_assert_int_eq(setenv(name, value, 1), 0);
-}
-
-static void run_peer(void)
+static bool run_peer(const char **const line)
 {
     static const char out[] = TEST_BUILD "/linuxcnc-7i65";
     static const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-peer",
@@ -39,31 +34,18 @@ static void run_peer(void)
                                        "7:7:100000:20",
                                        NULL};
     (void)mkdir(out, 0755);
-    set("PEER_MODULES", TEST_BUILD "/linuxcnc");
-    set("PEER_CARD", "hm2_7i93.0");
-    set("PEER_CONFIG", "");
-    set("PEER_ERROR", ERROR);
-    process_run(&run, argv, LIMIT_MS);
+    linuxcnc_tell("PEER_MODULES", TEST_BUILD "/linuxcnc");
+    linuxcnc_tell("PEER_CARD", "hm2_7i93.0");
+    linuxcnc_tell("PEER_CONFIG", "");
+    linuxcnc_tell("PEER_ERROR", ERROR);
+    return linuxcnc_run_to(&run, argv, LIMIT_MS, "reached: ", "the axes are not where they shall be", line);
 }
 
 START_TEST(two_loops_close_over_analog_outputs_and_multiplexed_encoders)
 {
     const char *line;
-    if (TEST_SANITIZED) {
-        printf("SKIP: a component built with a sanitizer cannot be loaded into LinuxCNC, and makes the card late\n");
-        return;
-    }
-    run_peer();
-    if (run.status == CANNOT_RUN && process_wait_line(&run, "SKIP: ", 0, &line)) {
+    if (linuxcnc_loads_ours() && run_peer(&line))
         printf("%.*s\n", (int)strcspn(line, "\n"), line);
-        return;
-    }
-    if (run.status != 0 || !process_wait_line(&run, "reached: ", 0, &line)) {
-        printf("%s\n", run.text);
-        fflush(stdout);
-        ck_abort_msg("the axes are not where they shall be, status %d", run.status);
-    }
-    printf("%.*s\n", (int)strcspn(line, "\n"), line);
 }
 END_TEST
 

@@ -34,15 +34,16 @@ bool linuxcnc_skipped(struct process *const run)
     return true;
 }
 
-void linuxcnc_run_to_ok_all(struct process *const run, const char *const *const argv, const int limit_ms,
-                            const char *const what)
+bool linuxcnc_run_to(struct process *const run, const char *const *const argv, const int limit_ms,
+                     const char *const start, const char *const what, const char **const line)
 {
     process_run(run, argv, limit_ms);
     if (linuxcnc_skipped(run))
-        return;
-    if (run->status != 0 || !process_wait_line(run, "ok all", 0, NULL)) {
+        return false;
+    if (run->status != 0 || !process_wait_line(run, start, 0, line)) {
         printf("%s\n", run->text); /* Check's own messages are short */
         fflush(stdout);
         ck_abort_msg("%s, status %d", what, run->status);
     }
+    return true;
 }
