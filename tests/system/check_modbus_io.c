@@ -370,9 +370,9 @@ static const char two_ways[] =
     "[TRANSACTION_01]\nMB_TX_CODE=fnct_06_write_single_register\nFIRST_ELEMENT=30\nNELEMENTS=1\n"
     "HAL_TX_NAME=out\nWRITE_MODE=change\n";
 
-static void load_two_ways(const char *const link)
+static void load_two_ways(const char *const link, const char *const transactions)
 {
-    write_file("two.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=2\n", link, two_ways);
+    write_file("two.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=2\n", link, transactions);
     start_server();
     load(path("two.ini"));
     talk_do(&hal, "setp mb2hal.out.00.int 7\nstart");
@@ -382,7 +382,7 @@ static void load_two_ways(const char *const link)
 
 START_TEST(what_does_not_change_is_written_once)
 {
-    load_two_ways(tcp_link());
+    load_two_ways(tcp_link(), two_ways);
     const unsigned asked = device->asked;
     while (device->asked < asked + 20)
         pause_ms(5);
@@ -394,9 +394,31 @@ START_TEST(what_does_not_change_is_written_once)
 }
 END_TEST
 
+static double seconds(void)
+{
+    struct timespec t;
+    (void)clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+START_TEST(what_does_not_change_is_written_again_after_the_time_that_is_set)
+{
+    static char refreshed[sizeof two_ways + 16];
+    const double start = seconds();
+    snprintf(refreshed, sizeof refreshed, "%sREFRESH_S=0.3\n", two_ways);
+    load_two_ways(tcp_link(), refreshed);
+    while (device->writes < 4)
+        pause_ms(5);
+    ck_assert(seconds() - start >= 3 * 0.3);
+    device->holding[30] = 99; /* the device has forgotten it */
+    await_word(&device->holding[30], 7);
+    talk_end(&hal);
+}
+END_TEST
+
 START_TEST(a_server_that_was_killed_and_comes_back_gets_its_outputs_again)
 {
-    load_two_ways(tcp_link());
+    load_two_ways(tcp_link(), two_ways);
     device->fault = SILENT; /* in the middle of a transaction */
     const unsigned asked = device->asked;
     while (device->asked == asked)
@@ -437,7 +459,7 @@ static void survive(const enum fault fault)
 
 START_TEST(silent_slow_and_truncated_answers_over_tcp)
 {
-    load_two_ways(tcp_link());
+    load_two_ways(tcp_link(), two_ways);
     survive(SILENT);
     survive(SLOW);
     survive(TRUNCATED);
@@ -448,7 +470,7 @@ END_TEST
 START_TEST(silence_and_wrong_checksums_on_a_terminal)
 {
     open_terminal();
-    load_two_ways(serial_link());
+    load_two_ways(serial_link(), two_ways);
     survive(SILENT);
     survive(WRONG_CRC);
     survive(TRUNCATED);
@@ -677,6 +699,7 @@ int main(void)
     tcase_add_test(tests, every_transaction_type_works_over_a_terminal);
     tcase_add_test(tests, types_scales_initial_values_and_enable_pins);
     tcase_add_test(tests, what_does_not_change_is_written_once);
+    tcase_add_test(tests, what_does_not_change_is_written_again_after_the_time_that_is_set);
     tcase_add_test(tests, a_server_that_was_killed_and_comes_back_gets_its_outputs_again);
     tcase_add_test(tests, silent_slow_and_truncated_answers_over_tcp);
     tcase_add_test(tests, silence_and_wrong_checksums_on_a_terminal);
