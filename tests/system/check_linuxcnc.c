@@ -208,12 +208,15 @@ static const char *shown(const char *const card, const char *const name)
     return value[turn];
 }
 
-/* Both came to rest at zero, and the card counted what the driver counted. */
+/* Both came to rest at zero, and the card counted what the driver counted: all, but for one that the generator has just
+ * counted and not yet made, or the other way round, when it rests at the edge of a count. */
 static void check_rest(const char *const card)
 {
+    const double made = strtod(shown(card, "encoder.00.rawcounts"), NULL),
+                 counted = strtod(shown(card, "stepgen.00.counts"), NULL);
     ck_assert_double_lt(fabs(strtod(shown(card, "stepgen.00.position-fb"), NULL)), STEP);
     ck_assert_double_lt(fabs(strtod(shown(card, "stepgen.01.position-fb"), NULL)), STEP);
-    ck_assert_str_eq(shown(card, "encoder.00.rawcounts"), shown(card, "stepgen.00.counts"));
+    ck_assert_double_le(fabs(made - counted), 1.0);
     ck_assert_str_eq(shown(card, "packet-error-total"), "0x00000000");
     ck_assert_str_eq(shown(card, "packet-error"), "FALSE");
     ck_assert_str_eq(shown(card, "io_error"), "FALSE");
