@@ -266,6 +266,10 @@ static bool rests(const char *const name)
         {"names/7i93/inmux", "gpio.00[1-4].in*"}, /* the address of multiplexed inputs */
         {"names/7i93_2x7i65/*", "gpio.0[13][37].in*"},
         {"names/7i93_sv12im_2x7i48/*", "gpio.0[13][04].in*"},
+        /* the excitation of resolvers, a pulse density */
+        {"names/7i93/*drives", "gpio.03[01].in*"},
+        {"names/7i93_sv6_7i49/*", "gpio.009.in*"},
+        {"names/7i93_sv6_7i49/*", "gpio.010.in*"},
         /* a remote's watchdog bites, or not yet, while it is asked */
         {"names/7i96s_7i77d/*", "7i??.0.?.fault"},
     };
