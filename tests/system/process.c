@@ -154,6 +154,17 @@ bool process_wait_line(struct process *const process, const char *const start, c
     }
 }
 
+bool process_started_or_skipped(struct process *const process, const char *const *const argv, const char *const start,
+                                const int limit_ms)
+{
+    process_start(process, argv);
+    if (process_wait_line(process, start, limit_ms, NULL))
+        return true;
+    printf("%s", process->text);
+    ck_assert_int_eq(process->status, 77);
+    return false;
+}
+
 bool process_wait_end(struct process *const process, const int limit_ms)
 {
     const int64_t end_ms = now_ms() + limit_ms;

@@ -48,6 +48,9 @@ void process_hush(struct process *process);
 /* Wait until it has printed a line that begins with `start`; false when it ended or limit_ms passed before. *line
  * (may be NULL) points at it, within text. */
 bool process_wait_line(struct process *process, const char *start, int limit_ms, const char **line);
+/* Start a program that has a reason not to run on every machine: true when it has printed a line that begins with
+ * `start`; false when it has ended with status 77, and what it said, "SKIP: reason", printed. */
+bool process_started_or_skipped(struct process *process, const char *const *argv, const char *start, int limit_ms);
 /* Wait until it ends by itself; false after limit_ms. */
 bool process_wait_end(struct process *process, int limit_ms);
 /* Send a signal and wait for the end. SIGKILL after limit_ms. Returns its status. */

@@ -488,56 +488,60 @@ static void print_names(const char *const heading, const char *const *names)
     }
 }
 
+static const char general_help[] =
+    "hm2sim: Mesa HostMot2 Ethernet cards, simulated, on UDP\n"
+    "\n"
+    "usage: hm2sim [OPTION...]\n"
+    "\n"
+    "  --card TYPE[@ADDRESS[:PORT]]  one more card (default: one 7i96s). Types are at the end\n"
+    "  --bind ADDRESS      of cards that give none (127.0.0.1)\n"
+    "  --port PORT         of cards that give none (27181; 0 = any free one)\n"
+    "  --seed N            of faults and MAC addresses (1)\n"
+    "  --faults LIST       loss=, dup=, reorder=, truncate=, foreign= 0..1, delay=US[-US], tail=0..1:US,\n"
+    "                      coalesce=US, sleep=US:US, busy=US:US; by commas\n"
+    "  --latency           replies take the time that a card takes\n"
+    "  --realtime[=PRIO]   SCHED_FIFO (priority 50) and locked memory, where permitted\n"
+    "  --run SECONDS       end after this time\n"
+    "  --stats[=SECONDS]   print statistics every second (or so), not only at the end\n"
+    "  --control PATH      take commands on a Unix datagram socket\n"
+    "  --serial REMOTE@PATH  a smart-serial remote in set-up mode on a pseudo-terminal, PATH a link to it\n"
+    "  --quiet             print the ready line only\n"
+    "  --help, --version\n";
+
+static const char card_help[] =
+    "\n"
+    "of the card named last, or of every card when before the first --card:\n"
+    "  --firmware FILE     image as text, lines of ADDRESS VALUE in hexadecimal\n"
+    "  --sources NAME      of its modules where generations differ without the image saying so: 2021 or later\n"
+    "  --name NAME         card name that it reports, in place of its type's\n"
+    "  --mac XX:XX:XX:XX:XX:XX\n"
+    "  --flash FILE        keep the configuration flash in a file\n"
+    "  --flash-chip SIZE   2Mb, 4Mb, 8Mb, 16Mb (the usual one), 32Mb, 64Mb\n"
+    "  --flash-times NAME  none, m25p16, m25p16-max, w25q16, w25q16-max\n"
+    "  --flash-faults LIST cut=OPERATION[:BYTES], stick=OPERATION, bad=ADDRESS:MASK[:TIMES]; by commas\n"
+    "  --jumpers N         address jumpers, 0 to 3; with 3 Efinix cards start the fallback image\n"
+    "  --wire FROM:TO      connect two I/O pins\n"
+    "  --follow ENC:STEPGEN[:NUM/DEN]  the encoder turns with the step generator\n"
+    "  --motor ENC:PWMGEN:COUNTS       the encoder turns with a motor, COUNTS a second at full duty\n"
+    "  --resolver CH:TURNS[:PWMGEN:SPEED]  a resolver, and a motor that turns it, SPEED turns a second at full "
+    "duty\n"
+    "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
+    "  --absolute READER:LIST          an absolute encoder at ssi.N, biss.N or fanuc.N. Keys, by commas: bits=,\n"
+    "                      value=HEX, position=AT:WIDTH[g], turns=AT:WIDTH[g], start=, speed=, "
+    "with=AXIS[:NUM/DEN],\n"
+    "                      delay=NS, idle=NS, processing=CLOCKS\n"
+    "  --uart PORT:TARGET  at uart.N or pktuart.N: loop, or the path of a terminal to make\n"
+    "  --7i65 PORT         a 7I65 with axes at a buffered SPI port\n"
+    "  --7i65-motor ENC:OUTPUT:COUNTS[:MS]  a motor at its output, COUNTS a second at 10 V, with a lag\n"
+    "  --ppmc PATH         Pico Systems encoder boards on a socket; they count the step generators' steps\n"
+    "  --switch IO:AXIS:POSITION:LEVELS  below the position of stepgen.N or encoder.N one level, then another\n"
+    "  --drive IO:LEVELS[:MS]  0, 1, z (floating), h (pulled up), MS milliseconds each\n"
+    "  --remote PORT:CHANNEL=CARD  a smart-serial card there. Cards:";
+
 static void print_help(void)
 {
-    fputs("hm2sim: Mesa HostMot2 Ethernet cards, simulated, on UDP\n"
-          "\n"
-          "usage: hm2sim [OPTION...]\n"
-          "\n"
-          "  --card TYPE[@ADDRESS[:PORT]]  one more card (default: one 7i96s). Types are at the end\n",
-          stdout);
-    fputs("  --bind ADDRESS      of cards that give none (127.0.0.1)\n"
-          "  --port PORT         of cards that give none (27181; 0 = any free one)\n"
-          "  --seed N            of faults and MAC addresses (1)\n"
-          "  --faults LIST       loss=, dup=, reorder=, truncate=, foreign= 0..1, delay=US[-US], tail=0..1:US,\n"
-          "                      coalesce=US, sleep=US:US, busy=US:US; by commas\n"
-          "  --latency           replies take the time that a card takes\n"
-          "  --realtime[=PRIO]   SCHED_FIFO (priority 50) and locked memory, where permitted\n"
-          "  --run SECONDS       end after this time\n"
-          "  --stats[=SECONDS]   print statistics every second (or so), not only at the end\n"
-          "  --control PATH      take commands on a Unix datagram socket\n"
-          "  --serial REMOTE@PATH  a smart-serial remote in set-up mode on a pseudo-terminal, PATH a link to it\n"
-          "  --quiet             print the ready line only\n"
-          "  --help, --version\n"
-          "\n"
-          "of the card named last, or of every card when before the first --card:\n"
-          "  --firmware FILE     image as text, lines of ADDRESS VALUE in hexadecimal\n"
-          "  --sources NAME      of its modules where generations differ without the image saying so: 2021 or later\n"
-          "  --name NAME         card name that it reports, in place of its type's\n"
-          "  --mac XX:XX:XX:XX:XX:XX\n"
-          "  --flash FILE        keep the configuration flash in a file\n"
-          "  --flash-chip SIZE   2Mb, 4Mb, 8Mb, 16Mb (the usual one), 32Mb, 64Mb\n"
-          "  --flash-times NAME  none, m25p16, m25p16-max, w25q16, w25q16-max\n"
-          "  --flash-faults LIST cut=OPERATION[:BYTES], stick=OPERATION, bad=ADDRESS:MASK[:TIMES]; by commas\n"
-          "  --jumpers N         address jumpers, 0 to 3; with 3 Efinix cards start the fallback image\n"
-          "  --wire FROM:TO      connect two I/O pins\n"
-          "  --follow ENC:STEPGEN[:NUM/DEN]  the encoder turns with the step generator\n"
-          "  --motor ENC:PWMGEN:COUNTS       the encoder turns with a motor, COUNTS a second at full duty\n"
-          "  --resolver CH:TURNS[:PWMGEN:SPEED]  a resolver, and a motor that turns it, SPEED turns a second at full "
-          "duty\n"
-          "  --index ENC:COUNTS  such an encoder has an index, every COUNTS counts\n"
-          "  --absolute READER:LIST          an absolute encoder at ssi.N, biss.N or fanuc.N. Keys, by commas: bits=,\n"
-          "                      value=HEX, position=AT:WIDTH[g], turns=AT:WIDTH[g], start=, speed=, "
-          "with=AXIS[:NUM/DEN],\n"
-          "                      delay=NS, idle=NS, processing=CLOCKS\n"
-          "  --uart PORT:TARGET  at uart.N or pktuart.N: loop, or the path of a terminal to make\n"
-          "  --7i65 PORT         a 7I65 with axes at a buffered SPI port\n"
-          "  --7i65-motor ENC:OUTPUT:COUNTS[:MS]  a motor at its output, COUNTS a second at 10 V, with a lag\n"
-          "  --ppmc PATH         Pico Systems encoder boards on a socket; they count the step generators' steps\n"
-          "  --switch IO:AXIS:POSITION:LEVELS  below the position of stepgen.N or encoder.N one level, then another\n"
-          "  --drive IO:LEVELS[:MS]  0, 1, z (floating), h (pulled up), MS milliseconds each\n"
-          "  --remote PORT:CHANNEL=CARD  a smart-serial card there. Cards:",
-          stdout);
+    fputs(general_help, stdout);
+    fputs(card_help, stdout);
     for (const char *const *card = sim_sserial_cards(); *card; card++)
         printf(" %s", *card);
     fputs(
