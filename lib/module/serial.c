@@ -259,9 +259,9 @@ void serial_write_lost(struct hm2_module *const module)
 static void miss(struct hm2_serial *const port)
 {
     port->counts.tx_uncertain += port->sent_bytes;
-    port->sent_bytes = 0;
     port->resend = false;
     port->ops->miss(port);
+    port->sent_bytes = 0;
 }
 
 void serial_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)

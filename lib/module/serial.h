@@ -79,7 +79,7 @@ struct serial_ops {
     int (*set)(struct hm2_serial *port, const struct hm2_serial_settings *settings, struct hm2_diag *diag);
     void (*take)(struct hm2_serial *port);                   /* a fresh reply; what was sent is counted already */
     void (*late)(struct hm2_serial *port, uint64_t request); /* one that was given up */
-    void (*miss)(struct hm2_serial *port);                   /* no fresh reply since the last write */
+    void (*miss)(struct hm2_serial *port);                   /* no fresh reply since the last write, of sent_bytes */
     void (*send)(struct hm2_serial *port);                   /* the next write, unless the last is sent again */
     void (*ask)(struct hm2_serial *port);                    /* the next request */
 };
