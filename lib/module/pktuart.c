@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * PktUART: bytes travel in frames. In each cycle up to seven sizes of received frames are taken, or up to 63 words of
- * those whose size is known; up to 63 words are sent as one frame. Traps of the firmware (Annex D) and what is done
- * about them: the first count is lost without a clear, so a clear precedes every mode; with automatic drive enable the
- * last of several frames is stranded, so one is sent at a time; frames beyond the buffers are told by what is left
- * over, and the receiver is cleared.
+ * those whose size is known; up to 63 words are sent, as one frame or, of a longer one, as a part. Traps of the
+ * firmware (Annex D) and what is done about them: the first count is lost without a clear, so a clear precedes every
+ * mode; with automatic drive enable the last of several frames is stranded, so one is sent at a time; frames beyond the
+ * buffers are told by what is left over, and the receiver is cleared.
  */
 #include <string.h>
 
@@ -14,6 +14,7 @@
 #define CLEAR           0x80010000u
 #define BLOCKS          6u
 #define WORDS           63u
+#define WRITE_BYTES     (4u * WORDS)
 #define SMALL_WORDS     16u
 #define FRAMES          16u
 #define QUEUED_FRAMES   12u
@@ -29,7 +30,9 @@
 #define FILTER_SHIFT    22
 #define FILTER_MASK     0xFFu
 #define RESET_FILTER_HZ 5e6
-#define MIN_GAP         11u /* below it each byte becomes a frame */
+#define MIN_GAP         11u  /* below it each byte becomes a frame */
+#define GAP_MAX         256u /* which the register shows as 0 */
+#define GAP_MASK        0xFFu
 #define NARROW_BITS     20u
 #define WIDE_BITS       24u
 #define WIDE_PROBE      0x00A00000u
@@ -40,9 +43,11 @@ struct pktuart {
     struct hm2_section tx_rate, rx_rate, tx_mode, rx_mode, rx_clear;
     struct queue out;
     struct hm2_window out_count, tx_state;
-    unsigned queued, queued_words; /* frames in the card, as far as known */
+    unsigned frame_bytes, given_bytes; /* of the frame in the last write: all, and those in writes so far */
+    unsigned queued, queued_words;     /* frames in the card, as far as known */
     uint8_t queue_words[FRAMES];
-    uint32_t tx_mode_seen;
+    unsigned seen; /* by the last reply */
+    bool spoilt;   /* words of a frame that will not be sent may be in the card */
     struct pkt_rx rx;
 };
 
@@ -87,11 +92,12 @@ static int refuse(const struct pktuart *const p, const struct hm2_serial_setting
 {
     if (s->parity != HM2_PARITY_NONE && p->version == 0)
         return hm2_diag_add(diag, HM2_ERR_RANGE, "this PktUART (version 0) has no parity");
-    if (s->tx_gap_bits < MIN_GAP || s->tx_gap_bits > 255 || s->rx_gap_bits < MIN_GAP || s->rx_gap_bits > 255)
+    const unsigned tx_least = s->frames ? 1 : MIN_GAP;
+    if (s->tx_gap_bits < tx_least || s->tx_gap_bits > GAP_MAX || s->rx_gap_bits < MIN_GAP || s->rx_gap_bits > GAP_MAX)
         return hm2_diag_add(diag, HM2_ERR_RANGE,
-                            "gaps of %u (sender) and %u bits (receiver) found, %u to 255 expected: with less each byte "
-                            "becomes a frame",
-                            s->tx_gap_bits, s->rx_gap_bits, MIN_GAP);
+                            "gaps of %u (sender) and %u bits (receiver) found, %u and %u to %u expected: a receiver "
+                            "with less makes a frame of each byte",
+                            s->tx_gap_bits, s->rx_gap_bits, tx_least, MIN_GAP, GAP_MAX);
     if (p->version == 0 && s->drive == HM2_DRIVE_AUTO && s->drive_delay_clk > 1)
         return hm2_diag_add(diag, HM2_ERR_RANGE,
                             "this PktUART (version 0) sends nothing with automatic drive enable and a delay above 1");
@@ -131,15 +137,16 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
     const uint32_t drive = s->drive == HM2_DRIVE_AUTO ? TX_AUTO : s->drive == HM2_DRIVE_ON ? TX_DRIVE : 0;
     set_rates(p, s);
     hm2_section_set(&p->tx_mode, 0, CLEAR);
-    hm2_section_set(&p->tx_mode, 1, parity | drive | s->drive_delay_clk | s->tx_gap_bits << GAP_SHIFT);
+    hm2_section_set(&p->tx_mode, 1, parity | drive | s->drive_delay_clk | (s->tx_gap_bits & GAP_MASK) << GAP_SHIFT);
     hm2_section_set(&p->rx_mode, 0, CLEAR);
     hm2_section_set(&p->rx_mode, 1,
-                    parity | RX_ENABLE | (s->mask ? RX_MASK : 0) | s->rx_gap_bits << GAP_SHIFT |
-                        (filter_clk(p, s) & FILTER_MASK) << FILTER_SHIFT);
+                    parity | (s->deaf ? 0 : RX_ENABLE) | (s->mask ? RX_MASK : 0) |
+                        (s->rx_gap_bits & GAP_MASK) << GAP_SHIFT | (filter_clk(p, s) & FILTER_MASK) << FILTER_SHIFT);
     hm2_section_touch(&p->tx_mode);
     hm2_section_touch(&p->rx_mode);
-    p->queued = p->queued_words = 0;
-    pkt_crowd_init(&p->rx.crowd, s->baud);
+    p->queued = p->queued_words = p->frame_bytes = 0;
+    p->spoilt = false;
+    pkt_crowd_init(&p->rx.crowd, s->baud, s->parity != HM2_PARITY_NONE);
     pkt_rx_forget(&p->rx, port);
     return 0;
 }
@@ -161,17 +168,18 @@ static int probe_rate(struct hm2_setup *const setup, const uint16_t address, uns
 /* ---- reply ----------------------------------------------------------------------------------------------------------
  */
 
-static unsigned sent_words(const struct pktuart *const p)
+static unsigned words_of(const unsigned bytes)
 {
-    return (p->port.sent_bytes + 3u) / 4u;
+    return (bytes + 3u) / 4u;
 }
 
 static void queue_frame(struct pktuart *const p)
 {
-    if (p->port.sent_bytes == 0 || p->queued == FRAMES)
+    if (p->frame_bytes == 0 || p->given_bytes < p->frame_bytes)
         return;
-    p->queue_words[p->queued++] = (uint8_t)sent_words(p);
-    p->queued_words += sent_words(p);
+    p->queue_words[p->queued++] = (uint8_t)words_of(p->frame_bytes);
+    p->queued_words += words_of(p->frame_bytes);
+    p->frame_bytes = 0;
 }
 
 /* For a clock at its beginning a frame is neither queued nor under way: so the mode is read twice, or the buffer would
@@ -184,11 +192,11 @@ static unsigned frames_in(const uint32_t mode)
 static void take_sent(struct pktuart *const p)
 {
     const unsigned before = frames_in(hm2_window_get(&p->tx_state, 0));
-    p->tx_mode_seen = hm2_window_get(&p->tx_state, 1);
+    const unsigned now = frames_in(hm2_window_get(&p->tx_state, 1));
     if (!p->port.resend)
         queue_frame(p);
-    const unsigned now = frames_in(p->tx_mode_seen), there = before > now ? before : now;
-    while (p->queued > there) {
+    p->seen = before > now ? before : now;
+    while (p->queued > p->seen) {
         p->queued_words -= p->queue_words[0];
         memmove(p->queue_words, p->queue_words + 1, --p->queued);
     }
@@ -216,50 +224,123 @@ static void late(struct hm2_serial *const port, const uint64_t request)
 /* ---- write ----------------------------------------------------------------------------------------------------------
  */
 
+static bool tx_set_up(const struct pktuart *const p)
+{
+    return hm2_section_confirmed(&p->tx_mode) && hm2_section_confirmed(&p->tx_rate);
+}
+
+/* The frame that is handed over in parts is not sent. */
+static void drop_parts(struct pktuart *const p, const unsigned counted)
+{
+    p->port.counts.tx_uncertain += p->frame_bytes - counted;
+    ring_drop(&p->port.tx, p->frame_bytes - p->given_bytes);
+    if (p->given_bytes < p->frame_bytes)
+        frames_drop(&p->port.tx_frames);
+    p->frame_bytes = 0;
+}
+
+/* A mode comes with a clear: of what the transmitter had nobody knows how much it has sent. */
+static void forget_sent(struct pktuart *const p)
+{
+    if (p->frame_bytes > 0)
+        drop_parts(p, 0);
+    p->port.counts.tx_uncertain += 4u * p->queued_words;
+    p->queued = p->queued_words = 0;
+    p->spoilt = false;
+}
+
+/* A frame of one write is in the card, or is not. Of a longer one a part may be missing: it is given up, and the card
+ * cleared of it, or what follows would be sent in its place. */
 static void miss(struct hm2_serial *const port)
 {
     struct pktuart *const p = (struct pktuart *)port;
-    queue_frame(p); /* it may be in the card */
+    if (p->frame_bytes > WRITE_BYTES) {
+        drop_parts(p, port->sent_bytes);
+        p->spoilt = true;
+    } else {
+        queue_frame(p);
+    }
+    p->seen = FRAMES;
     pkt_rx_miss(&p->rx);
+}
+
+/* When it has sent the frames before, and the spoilt one if that is whole after all. */
+static void clear_spoilt(struct pktuart *const p)
+{
+    if (!p->spoilt || p->seen > 0)
+        return;
+    p->spoilt = false;
+    hm2_section_touch(&p->tx_mode);
 }
 
 static bool may_send(const struct pktuart *const p)
 {
-    if (!hm2_section_confirmed(&p->tx_mode) || !hm2_section_confirmed(&p->tx_rate))
-        return false;
-    if (p->queued + p->rx.crowd.frames >= FRAMES - 1u)
+    if (p->spoilt || p->queued + p->rx.crowd.frames >= FRAMES - 1u)
         return false;
     if (p->port.settings.drive == HM2_DRIVE_AUTO)
-        return p->queued == 0 && !(p->tx_mode_seen & MODE_ACTIVE);
+        return p->queued == 0 && p->seen == 0;
     return p->port.settings.drive == HM2_DRIVE_ON && p->queued < QUEUED_FRAMES;
 }
 
 /* What is sent may come back, at once or as an answer of the same length: the receiver has room for it all, however
- * late the next cycle is. Frames have few places, so a small room is not filled with a part of what waits. */
-static unsigned words_to_send(const struct pktuart *const p)
+ * late the next cycle is. */
+static unsigned room_words(const struct pktuart *const p)
 {
     const unsigned there = p->queued_words + pkt_rx_most_words(&p->rx, p->port.now_ns);
-    const unsigned free_words = there < PKT_BUFFER_WORDS ? PKT_BUFFER_WORDS - there : 0;
-    const unsigned waiting_words = (ring_used(&p->port.tx) + 3u) / 4u;
-    if (free_words < SMALL_WORDS && free_words < waiting_words)
+    return there < PKT_BUFFER_WORDS ? PKT_BUFFER_WORDS - there : 0;
+}
+
+/* Frames have few places, so a small room is not filled with a part of what waits. */
+static unsigned next_of_stream(const struct pktuart *const p)
+{
+    const unsigned room = room_words(p), waiting = ring_used(&p->port.tx);
+    if (room < SMALL_WORDS && room < words_of(waiting))
         return 0;
-    return free_words < WORDS ? free_words : WORDS;
+    const unsigned most = room < WORDS ? 4u * room : WRITE_BYTES;
+    return waiting < most ? waiting : most;
+}
+
+/* One that is longer than the room will ever be is sent when nothing else is under way. */
+static unsigned next_whole(const struct pktuart *const p)
+{
+    const unsigned bytes = frames_oldest(&p->port.tx_frames);
+    const bool rests = p->queued == 0 && p->rx.frames == 0 && p->rx.still;
+    return rests || words_of(bytes) <= room_words(p) ? bytes : 0;
+}
+
+/* The next bytes, of the frame under way or a new one. */
+static unsigned fetch(struct pktuart *const p, uint8_t *const bytes)
+{
+    const bool framed = p->port.settings.frames;
+    if (p->frame_bytes == 0) {
+        p->given_bytes = 0;
+        p->frame_bytes = !may_send(p) ? 0 : framed ? next_whole(p) : next_of_stream(p);
+    }
+    const unsigned left = p->frame_bytes - p->given_bytes, len = left < WRITE_BYTES ? left : WRITE_BYTES;
+    (void)ring_get(&p->port.tx, bytes, len);
+    p->given_bytes += len;
+    if (framed && len > 0 && p->given_bytes == p->frame_bytes)
+        frames_drop(&p->port.tx_frames);
+    return len;
 }
 
 static void send_frame(struct hm2_serial *const port)
 {
     struct pktuart *const p = (struct pktuart *)port;
-    uint8_t bytes[4u * WORDS] = {0};
-    const unsigned most = words_to_send(p);
-    port->sent_bytes = may_send(p) ? (unsigned)ring_get(&port->tx, bytes, (size_t)4u * most) : 0;
-    const unsigned words = sent_words(p);
+    uint8_t bytes[WRITE_BYTES] = {0};
+    clear_spoilt(p);
+    if (!tx_set_up(p))
+        forget_sent(p);
+    port->sent_bytes = tx_set_up(p) ? fetch(p, bytes) : 0;
+    const unsigned words = words_of(port->sent_bytes);
     queue_aim(&p->out, words);
     for (unsigned n = 0; n < words; n++) {
         const struct queue_place at = queue_place(&p->out, words, n);
         hm2_window_set(at.window, at.word, hm2_get_le32(bytes + 4u * n));
     }
-    hm2_put_le16(p->out_count.address, words ? port->tx_reg[SERIAL_COUNT] : HM2_PLAN_NOWHERE);
-    hm2_window_set(&p->out_count, 0, port->sent_bytes);
+    const bool ends = words > 0 && p->given_bytes == p->frame_bytes;
+    hm2_put_le16(p->out_count.address, ends ? port->tx_reg[SERIAL_COUNT] : HM2_PLAN_NOWHERE);
+    hm2_window_set(&p->out_count, 0, p->frame_bytes);
 }
 
 static void ask(struct hm2_serial *const port)

@@ -3,16 +3,17 @@
 
 #include <string.h>
 
-#define BITS_A_WORD 40.0   /* start and stop bits included */
+#define WORD_BYTES  4.0
 #define FASTEST     1.0625 /* a peer's clock that is off by more is not understood */
 #define NS_PER_S    1e9
 #define WORDS_MAX   1e6  /* of a receiver that nobody has looked at for long */
 #define BEGUN_WORDS 32.0 /* a frame that is seen first has had no more of them, for what can be known */
 #define FRAME_WORDS (PKT_FRAME_MODULUS / 4.0)
 
-void pkt_crowd_init(struct pkt_crowd *const crowd, const uint32_t baud)
+void pkt_crowd_init(struct pkt_crowd *const crowd, const uint32_t baud, const bool parity)
 {
-    crowd->words_per_ns = baud * FASTEST / (BITS_A_WORD * NS_PER_S);
+    const double bits_a_word = WORD_BYTES * (parity ? 11.0 : 10.0); /* start and stop bits included */
+    crowd->words_per_ns = baud * FASTEST / (bits_a_word * NS_PER_S);
     crowd->begun_ns = (int64_t)(BEGUN_WORDS / crowd->words_per_ns);
 }
 

@@ -35,7 +35,7 @@ struct pkt_crowd {
     int64_t run_ns, run_seen_ns; /* one frame was under way from then to then, at least */
 };
 
-void pkt_crowd_init(struct pkt_crowd *crowd, uint32_t baud);
+void pkt_crowd_init(struct pkt_crowd *crowd, uint32_t baud, bool parity);
 void pkt_crowd_see(struct pkt_crowd *crowd, const struct pkt_sight *sight);
 /* Words of unknown frames that can be in the card at a time, and bytes that those had. */
 unsigned pkt_crowd_words(const struct pkt_crowd *crowd, int64_t now_ns);

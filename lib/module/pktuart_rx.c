@@ -42,9 +42,11 @@ int pkt_rx_add(struct pkt_rx *const rx, const struct hm2_serial *const port, str
 /* ---- frames -------------------------------------------------------------------------------------------------------
  */
 
-static void add_frame(struct pkt_rx *const rx, const unsigned bytes)
+static void add_frame(struct pkt_rx *const rx, const unsigned bytes, const bool bad)
 {
-    rx->size[(rx->first + rx->frames++) % PKT_RX_FRAMES] = (uint16_t)bytes;
+    const unsigned place = (rx->first + rx->frames++) % PKT_RX_FRAMES;
+    rx->size[place] = (uint16_t)bytes;
+    rx->bad[place] = bad;
 }
 
 /* Bytes in the next word of the oldest frame, which is taken from it. */
@@ -76,19 +78,35 @@ static unsigned frame_bytes(const struct pkt_rx *const rx)
     return bytes;
 }
 
+/* What the port has of the oldest frame is all that it gets. */
+static void end_frame(struct pkt_rx *const rx, struct hm2_serial *const port, const bool good)
+{
+    if (port->settings.frames && rx->kept > 0) {
+        frames_put(&port->rx_frames, good ? rx->kept : rx->kept | FRAME_SPOILT);
+        port->counts.rx_bytes -= good ? 0 : rx->kept;
+        port->counts.rx_uncertain += good ? 0 : rx->kept;
+    }
+    rx->kept = 0;
+    rx->spoilt = false;
+}
+
 /* The next word of the oldest frame, for the port or only counted. */
 static void hand_over(struct pkt_rx *const rx, struct hm2_serial *const port, const uint32_t word, const bool good)
 {
     uint8_t bytes[WORD_BYTES];
     const unsigned frames = rx->frames;
-    const bool keep = good && !rx->skips;
-    const unsigned len = next_word(rx);
-    rx->skips = rx->skips && rx->frames == frames;
+    const bool keep = good && !rx->skips, bad = rx->bad[rx->first];
+    const unsigned len = next_word(rx), put = keep ? len : 0;
     hm2_put_le32(bytes, word);
-    if (keep)
-        port->counts.rx_bytes += (uint32_t)ring_put(&port->rx, bytes, len);
-    else
-        port->counts.rx_uncertain += len;
+    (void)ring_put(&port->rx, bytes, put);
+    port->counts.rx_bytes += put;
+    port->counts.rx_uncertain += len - put;
+    rx->kept += put;
+    rx->spoilt = rx->spoilt || put < len;
+    if (rx->frames == frames)
+        return;
+    rx->skips = false;
+    end_frame(rx, port, !bad && !rx->spoilt);
 }
 
 static void deliver(struct pkt_rx *const rx, struct hm2_serial *const port, const uint32_t word)
@@ -176,6 +194,7 @@ static void give_up(struct pkt_rx *const rx, struct hm2_serial *const port)
     if (hunt->lost_sizes > 0 && most > hunt->known_words)
         port->counts.rx_uncertain += WORD_BYTES * (most - hunt->known_words);
     rx->frames = 0;
+    end_frame(rx, port, false);
 }
 
 /* Everything that the card had is here: what is missing? The last word of a frame whose size was lost holds one byte to
@@ -256,6 +275,7 @@ void pkt_rx_forget(struct pkt_rx *const rx, struct hm2_serial *const port)
         give_up(rx, port);
     else
         port->counts.rx_uncertain += frame_bytes(rx);
+    end_frame(rx, port, false);
     rx->hunt.on = rx->unanswered = rx->skips = rx->doubt.on = false;
     rx->frames = rx->asked_words = rx->asked_counts = 0;
 }
@@ -293,7 +313,7 @@ static void take_sizes(struct pkt_rx *const rx, struct hm2_serial *const port)
             port->counts.rx_errors++;
         if ((count & SIZE_MASK) == 0)
             continue;
-        add_frame(rx, count & SIZE_MASK);
+        add_frame(rx, count & SIZE_MASK, (count & SIZE_ERRORS) != 0);
         rx->hunt.known_words += words_of(count & SIZE_MASK);
         rx->hunt.known_bytes += count & SIZE_MASK;
     }
@@ -389,8 +409,9 @@ static unsigned words_there(const struct pkt_rx *const rx)
 /* What is held goes into the ring at once some time. */
 static unsigned room_words(const struct pkt_rx *const rx, const struct hm2_serial *const port)
 {
-    const unsigned room = (RING_BYTES - ring_used(&port->rx)) / WORD_BYTES;
-    const unsigned held = rx->hunt.on ? rx->hunt.held : 0;
+    const unsigned bytes = (RING_BYTES - ring_used(&port->rx)) / WORD_BYTES;
+    const unsigned places = FRAME_PLACES - 1u - frames_used(&port->rx_frames); /* one is for what is cut off */
+    const unsigned room = smaller(bytes, places), held = rx->hunt.on ? rx->hunt.held : 0;
     return room > held ? room - held : 0;
 }
 

@@ -50,6 +50,9 @@ struct pkt_rx {
     bool words_next;
     unsigned first, frames; /* whose size is known, oldest first; a ring */
     uint16_t size[PKT_RX_FRAMES];
+    bool bad[PKT_RX_FRAMES]; /* received with an error */
+    unsigned kept;           /* bytes of the oldest that the port has already */
+    bool spoilt;             /* some are missing */
     struct pkt_hunt hunt;
     struct pkt_crowd crowd;
     struct pkt_doubt doubt;

@@ -31,6 +31,12 @@ size_t ring_get(struct ring *const ring, uint8_t *const bytes, const size_t size
     return given;
 }
 
+void ring_drop(struct ring *const ring, const size_t len)
+{
+    const unsigned tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
+    atomic_store_explicit(&ring->tail, tail + (unsigned)smaller(len, ring_used(ring)), memory_order_release);
+}
+
 /* ---- queues ---------------------------------------------------------------------------------------------------------
  */
 
@@ -97,9 +103,17 @@ int hm2_serial_set(struct hm2_serial *const port, const struct hm2_serial_settin
     int err = serial_check(port, settings, diag);
     if (!err)
         err = port->ops->set(port, settings, diag);
-    if (!err)
-        port->settings = *settings;
-    return err;
+    if (err)
+        return err;
+    if (settings->frames || port->settings.frames)
+        serial_drop_frames(port);
+    port->settings = *settings;
+    return 0;
+}
+
+struct hm2_serial_settings hm2_serial_current(const struct hm2_serial *const port)
+{
+    return port->settings;
 }
 
 int serial_check(const struct hm2_serial *const port, const struct hm2_serial_settings *const settings,
@@ -123,12 +137,12 @@ uint32_t serial_rate(const struct hm2_serial *const port, const uint32_t baud, c
 
 size_t hm2_serial_put(struct hm2_serial *const port, const uint8_t *const bytes, const size_t len)
 {
-    return ring_put(&port->tx, bytes, len);
+    return port->settings.frames ? 0 : ring_put(&port->tx, bytes, len);
 }
 
 size_t hm2_serial_get(struct hm2_serial *const port, uint8_t *const bytes, const size_t size)
 {
-    return ring_get(&port->rx, bytes, size);
+    return port->settings.frames ? 0 : ring_get(&port->rx, bytes, size);
 }
 
 size_t hm2_serial_waiting(const struct hm2_serial *const port)
@@ -259,9 +273,9 @@ void serial_write_lost(struct hm2_module *const module)
 static void miss(struct hm2_serial *const port)
 {
     port->counts.tx_uncertain += port->sent_bytes;
-    port->sent_bytes = 0;
     port->resend = false;
     port->ops->miss(port);
+    port->sent_bytes = 0;
 }
 
 void serial_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)

@@ -27,6 +27,29 @@ static inline unsigned ring_used(const struct ring *const ring)
 
 size_t ring_put(struct ring *ring, const uint8_t *bytes, size_t len);
 size_t ring_get(struct ring *ring, uint8_t *bytes, size_t size);
+void ring_drop(struct ring *ring, size_t len);
+
+/* Lengths of the frames in a ring of bytes, oldest first. The bytes are there before the length, and taken before it is
+ * dropped. */
+#define FRAME_PLACES 256u
+#define FRAME_SPOILT 0x8000u /* besides the length: not what was sent */
+
+struct frame_ring {
+    atomic_uint head, tail;
+    uint16_t frame[FRAME_PLACES];
+};
+
+static inline unsigned frames_used(const struct frame_ring *const ring)
+{
+    return atomic_load_explicit(&ring->head, memory_order_acquire) -
+           atomic_load_explicit(&ring->tail, memory_order_acquire);
+}
+
+/* There must be a place. */
+void frames_put(struct frame_ring *ring, unsigned frame);
+/* 0 when there is none. */
+unsigned frames_oldest(const struct frame_ring *ring);
+void frames_drop(struct frame_ring *ring);
 
 /* ---- 0 to 63 words of a FIFO: blocks of 1, 2, 4 ... words, each of which goes to the FIFO or nowhere ----------------
  */
@@ -69,8 +92,10 @@ struct hm2_serial {
     int64_t sent_ns, now_ns; /* take: of the request, and of its reply; late and ask: now */
     struct hm2_serial_settings settings;
     struct ring tx, rx;
-    struct hm2_serial_counts counts;       /* the cycle's own */
-    _Atomic uint32_t shown[SERIAL_COUNTS]; /* the same, for the other thread */
+    struct frame_ring tx_frames, rx_frames; /* when the settings say frames */
+    uint32_t told_lost;                     /* the sum of losses at the last hm2_serial_lost() */
+    struct hm2_serial_counts counts;        /* the cycle's own */
+    _Atomic uint32_t shown[SERIAL_COUNTS];  /* the same, for the other thread */
 };
 
 /* In the order of a cycle; all but the first two are called for open ports only. */
@@ -79,7 +104,7 @@ struct serial_ops {
     int (*set)(struct hm2_serial *port, const struct hm2_serial_settings *settings, struct hm2_diag *diag);
     void (*take)(struct hm2_serial *port);                   /* a fresh reply; what was sent is counted already */
     void (*late)(struct hm2_serial *port, uint64_t request); /* one that was given up */
-    void (*miss)(struct hm2_serial *port);                   /* no fresh reply since the last write */
+    void (*miss)(struct hm2_serial *port);                   /* no fresh reply since the last write, of sent_bytes */
     void (*send)(struct hm2_serial *port);                   /* the next write, unless the last is sent again */
     void (*ask)(struct hm2_serial *port);                    /* the next request */
 };
@@ -109,6 +134,9 @@ int serial_setup_receiver(struct hm2_module *module, struct hm2_setup *setup);
 const char *serial_output_name(const struct hm2_pd *pd);
 /* NULL when there is none. */
 struct hm2_serial *serial_port(const struct hm2_module *module, unsigned unit);
+
+/* All that wait, and what else is in the rings. */
+void serial_drop_frames(struct hm2_serial *port);
 
 void serial_unpack(struct hm2_module *module, const struct hm2_cycle *cycle);
 void serial_pack(struct hm2_module *module, const struct hm2_cycle *cycle);

@@ -95,6 +95,8 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
     struct uart *const u = (struct uart *)port;
     if (s->parity != HM2_PARITY_NONE)
         return hm2_diag_add(diag, HM2_ERR_RANGE, "a UART has no parity (a PktUART from version 1 on has)");
+    if (s->frames || s->deaf)
+        return hm2_diag_add(diag, HM2_ERR_RANGE, "a UART has no frames and cannot be deaf (a PktUART has and can)");
     const uint32_t rate = serial_rate(port, s->baud, RATE_BITS);
     const uint32_t drive = s->drive == HM2_DRIVE_AUTO ? TX_AUTO : s->drive == HM2_DRIVE_ON ? TX_DRIVE : 0;
     hm2_section_set(&u->tx_rate, 0, rate);

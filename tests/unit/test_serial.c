@@ -2,9 +2,7 @@
 /* UART and PktUART as byte streams, looped back on simulated cards, in virtual time. */
 #include "unit.h"
 
-#include <hm2/serial.h>
-
-#include "sim_bench.h"
+#include "serial_rig.h"
 
 struct loop {
     const char *firmware;
@@ -19,18 +17,6 @@ struct loop {
 
 #define STALL_EVERY 50u /* cycles from one stall of the thread to the next */
 
-struct peer {
-    struct sim_bench *bench;
-    uint8_t gtag;
-};
-
-/* The world outside sends back what it hears. */
-static void echo(void *context, uint8_t byte)
-{
-    const struct peer *const peer = context;
-    assert_int_equal(sim_card_serial_put(peer->bench->card, peer->gtag, 0, &byte, 1), 1);
-}
-
 static uint8_t pattern(const size_t n)
 {
     return (uint8_t)(n * 31u + n / 251u);
@@ -40,14 +26,7 @@ static struct hm2_serial *open_port(struct sim_bench *bench, const struct loop *
 {
     const struct hm2_serial_settings settings = {
         .baud = loop->baud, .parity = loop->parity, .drive = loop->drive, .tx_gap_bits = 24, .rx_gap_bits = 14};
-    struct hm2_serial *const port = hm2_serial_port(bench->board, loop->kind, 0);
-    assert_non_null(port);
-    hm2_board_change_begin(bench->board);
-    assert_int_equal(hm2_serial_open(port, &bench->diag), 0);
-    assert_int_equal(hm2_board_change_end(bench->board, &bench->diag), 0);
-    if (hm2_serial_set(port, &settings, &bench->diag) != 0)
-        fail_msg("%s", bench->diag.text);
-    return port;
+    return serial_rig_open(bench, loop->kind, &settings);
 }
 
 /* With HM2_SERIAL_BYTES in the environment as much as that goes round: 10000000 takes some minutes. */
@@ -68,9 +47,8 @@ static size_t run_loop(const struct loop *loop, const size_t total, const unsign
 {
     struct sim_bench *const bench = sim_bench_new("7i80hd-16", loop->firmware, "");
     struct hm2_serial *const port = open_port(bench, loop);
-    struct peer peer = {bench, loop->gtag};
     size_t put = 0, got = 0, idle = 0;
-    assert_int_equal(sim_card_serial(bench->card, loop->gtag, 0, echo, &peer), 0);
+    serial_rig_echo(bench, loop->gtag);
     for (unsigned cycle = 1; got < total && idle < 200; cycle++) {
         uint8_t bytes[512];
         size_t n = 0;
@@ -370,6 +348,60 @@ static void a_lost_request_costs_a_packet_uart_that_rests_nothing(void **state)
     }
 }
 
+struct ear {
+    size_t put, heard, wrong;
+};
+
+static void hear(void *context, uint8_t byte)
+{
+    struct ear *const ear = context;
+    ear->wrong += byte != pattern(ear->heard++);
+}
+
+static void deafen(void *context, const uint8_t *data, size_t len, bool done)
+{
+    static const struct sim_faults gale = {.seed = 1, .loss = 1.0};
+    const struct weather *const w = context;
+    (void)data;
+    (void)len;
+    if (!done && w->loses)
+        assert_int_equal(sim_net_set_faults(w->bench->net, &gale), 0);
+}
+
+/* The writes arrive, but no reply tells: no more is sent than the card's transmitter can keep, and nothing of it is
+ * overwritten. */
+static void a_packet_uart_that_hears_no_replies_spoils_nothing_that_it_sends(void **state)
+{
+    static const struct sim_faults calm = {.seed = 1};
+    static const struct loop loop = {
+        "PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_PARITY_NONE, HM2_DRIVE_ON, 0, 3000, 1};
+    (void)state;
+    struct sim_bench *const bench = sim_bench_new("7i80hd-16", loop.firmware, "");
+    struct hm2_serial *const port = open_port(bench, &loop);
+    struct weather w = {.bench = bench};
+    struct ear ear = {0};
+    assert_int_equal(sim_card_serial(bench->card, loop.gtag, 0, hear, &ear), 0);
+    sim_net_on_taken(bench->net, deafen, &w);
+    sim_bench_set(bench, "packet-error-limit", 1e6);
+    for (w.cycle = 1; w.cycle < 459; w.cycle++) {
+        w.loses = w.cycle % 80 >= 60;
+        for (unsigned i = 0; w.cycle % 80 == 60 && i < loop.burst; i++, ear.put++) {
+            const uint8_t byte = pattern(ear.put);
+            assert_int_equal(hm2_serial_put(port, &byte, 1), 1);
+        }
+        assert_int_equal(sim_net_set_faults(bench->net, &calm), 0);
+        hm2_board_read(bench->board, BENCH_PERIOD_NS);
+        assert_int_equal(sim_net_set_faults(bench->net, &calm), 0);
+        hm2_board_write(bench->board, BENCH_PERIOD_NS);
+        stall(bench, 1);
+    }
+    assert_true(sim_net_truth(bench->net).lost[1] > 90);
+    assert_int_equal(ear.heard, ear.put);
+    assert_int_equal(ear.wrong, 0);
+    assert_true(hm2_serial_counts(port).tx_uncertain > 0);
+    sim_bench_free(bench);
+}
+
 /* ---- more than the card can keep --------------------------------------------------------------------------------- */
 
 /* A frame of more than 1023 bytes has a size that is too small, and words that do not read are overwritten: the
@@ -428,6 +460,7 @@ int main(void)
         cmocka_unit_test(what_the_card_cannot_keep_is_counted_and_nothing_wrong_arrives),
         cmocka_unit_test(a_thread_that_stalls_costs_short_messages_nothing),
         cmocka_unit_test(late_replies_cost_no_byte),
+        cmocka_unit_test(a_packet_uart_that_hears_no_replies_spoils_nothing_that_it_sends),
         cmocka_unit_test(a_lost_request_costs_a_packet_uart_that_rests_nothing),
         cmocka_unit_test(lost_replies_are_counted_and_what_arrives_is_in_order),
     };

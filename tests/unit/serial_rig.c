@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+#include "serial_rig.h"
+
+#include "unit.h"
+
+struct hm2_serial *serial_rig_open(struct sim_bench *bench, const enum hm2_serial_kind kind,
+                                   const struct hm2_serial_settings *settings)
+{
+    struct hm2_serial *const port = hm2_serial_port(bench->board, kind, 0);
+    assert_non_null(port);
+    hm2_board_change_begin(bench->board);
+    assert_int_equal(hm2_serial_open(port, &bench->diag), 0);
+    assert_int_equal(hm2_board_change_end(bench->board, &bench->diag), 0);
+    if (hm2_serial_set(port, settings, &bench->diag) != 0)
+        fail_msg("%s", bench->diag.text);
+    return port;
+}
+
+static void echo_uart(void *context, uint8_t byte)
+{
+    const struct sim_bench *const bench = context;
+    assert_int_equal(sim_card_serial_put(bench->card, HM2_GTAG_UART_TX, 0, &byte, 1), 1);
+}
+
+static void echo_pktuart(void *context, uint8_t byte)
+{
+    const struct sim_bench *const bench = context;
+    assert_int_equal(sim_card_serial_put(bench->card, HM2_GTAG_PKTUART_TX, 0, &byte, 1), 1);
+}
+
+void serial_rig_echo(struct sim_bench *bench, const uint8_t gtag)
+{
+    const bool uart = gtag == HM2_GTAG_UART_TX;
+    assert_int_equal(sim_card_serial(bench->card, gtag, 0, uart ? echo_uart : echo_pktuart, bench), 0);
+}

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/* A serial port of a simulated card, in virtual time. */
+#ifndef SERIAL_RIG_H
+#define SERIAL_RIG_H
+
+#include <hm2/serial.h>
+
+#include "sim_bench.h"
+
+/* Open port 0 and set it. Fails the test when something does not work. */
+struct hm2_serial *serial_rig_open(struct sim_bench *bench, enum hm2_serial_kind kind,
+                                   const struct hm2_serial_settings *settings);
+/* The world outside sends back what it hears from port 0 of the module; it lasts as long as the bench. */
+void serial_rig_echo(struct sim_bench *bench, uint8_t gtag);
+
+#endif
