@@ -90,3 +90,9 @@ unsigned dropin_table_unused(const char *const scope)
     }
     return unused;
 }
+
+bool dropin_table_wanted(const char *const where)
+{
+    const char *const only = getenv("DROPIN_ONLY");
+    return !only || fnmatch(only, where, 0) == 0;
+}

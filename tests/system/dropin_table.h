@@ -21,4 +21,8 @@ const char *dropin_table_allows(const char *where, const char *what, const char 
  * nothing since the table was loaded; returns how many these are. */
 unsigned dropin_table_unused(const char *scope);
 
+/* For looking closer: DROPIN_ONLY=PATTERN in the environment runs only what matches it, a shell pattern for what
+ * `where` is: DROPIN_ONLY='names/7i93/absolute', DROPIN_ONLY='*motion'. True for all when it is not set. */
+bool dropin_table_wanted(const char *where);
+
 #endif
