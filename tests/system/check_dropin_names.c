@@ -33,6 +33,7 @@ struct load {
 #define SSERIALB TEST_DATA "/firmware/sserialb_51.hex"
 #define DRIVES   TEST_DATA "/firmware/drives_29_48.hex"
 #define INMUX    TEST_DATA "/firmware/inmux_48.hex"
+#define LATCH    TEST_DATA "/firmware/latch_48.hex"
 
 static const struct load loads[] = {
     {"7i96s", "default", "", {NULL}},
@@ -82,6 +83,8 @@ static const struct load loads[] = {
      {"--firmware", ABSOLUTE}},
     {"7i93", "no-absolute", "", {"--firmware", ABSOLUTE}},
     {"7i93", "inmux", "", {"--firmware", INMUX}},
+    {"7i93", "latch", "", {"--firmware", LATCH}},
+    {"7i93", "latch-narrow", "stepgen_width=1", {"--firmware", LATCH}},
     {"7i93", "drives", "", {"--firmware", DRIVES}},
     {"7i93",
      "fewer-drives",
