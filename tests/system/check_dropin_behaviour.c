@@ -18,7 +18,7 @@
 #include "dropin/scenario.h"
 #include "dropin_table.h"
 
-#define MAX_POINTS 800u
+#define MAX_POINTS 1000u
 #define MAX_CYCLES 4000u
 #define MAX_WRITES 1000000u
 #define REGISTERS  0x4000u
@@ -82,6 +82,7 @@ static void run_driver(const struct scenario *const scenario, const enum driver_
     run.driver.paced = scenario->paced;
     run.driver.firmware = scenario->firmware;
     run.driver.sources = scenario->sources;
+    run.driver.remote = scenario->remote;
     run.driver.has_7i65 = scenario->has_7i65;
     run.driver.on_write = on_write;
     run.driver.context = &run;

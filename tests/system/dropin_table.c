@@ -8,7 +8,7 @@
 #include <string.h>
 #include <sys/mman.h>
 
-#define MAX_ROWS 256u
+#define MAX_ROWS 512u
 
 struct row {
     char where[64], what[16], name[64], limit[16];

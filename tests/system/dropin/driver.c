@@ -13,6 +13,7 @@
 
 #include "halhost.h"
 #include "sockets.h"
+#include "sserial.h"
 #include "state.h"
 
 #define WRITE_NS  (DRIVER_PERIOD_NS * 4 / 10)
@@ -211,6 +212,8 @@ static void open_card(struct driver *const driver, const char *const card)
     }
     if (sim_card_new(&driver->card, &options, &diag) != 0)
         ck_abort_msg("no card: %s", diag.text);
+    if (driver->remote && sim_sserial_plug(driver->card, 0, 0, driver->remote, 1, &diag) != 0)
+        ck_abort_msg("no remote: %s", diag.text);
     if (driver->has_7i65)
         ck_assert_int_eq(sim_7i65_new(&driver->servo, driver->card, 0), 0);
     ck_assert_int_eq(sim_net_new(&driver->net, driver->card, NULL), 0);

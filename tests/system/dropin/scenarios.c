@@ -526,6 +526,39 @@ static const struct event drives_events[] = {
     {360, 0, INPUT, HM2_GTAG_TPPWM, 0, TPPWM_FAULT, 0},
 };
 
+/* ---- a 7I77: field inputs and outputs, analog inputs and encoders of one remote, analog outputs of the other. Smart
+ * serial is set going by the first cycles; nothing is compared before. */
+
+static const struct setting remote_settings[] = {
+    {0, "watchdog.timeout_ns", 20000000},
+    {0, "7i77.0.1.analogout0-scalemax", 20},
+    {0, "7i77.0.1.analogout0-minlim", -15},
+    {0, "7i77.0.1.analogout1-maxlim", 5},
+    {70, "7i77.0.1.analogena", 1},
+    {75, "7i77.0.1.spinena", 1},
+    {300, "7i77.0.0.output-03-invert", 1},
+    {350, "7i77.0.1.analogout0-scalemax", 10},
+    {400, "7i77.0.0.analogin0-scalemax", 20},
+    {400, "7i77.0.0.enc0.scale", -4},
+    {450, "7i77.0.0.enc0.reset", 1},
+    {460, "7i77.0.0.enc0.reset", 0},
+};
+
+static const struct wave remote_waves[] = {
+    {"7i77.0.1.analogout0", WAVE_SINE, 22, 0, 200, 0, 600},
+    {"7i77.0.1.analogout1", WAVE_TRIANGLE, 9, 1, 130, 0, 600},
+    {"7i77.0.1.analogout5", WAVE_SQUARE, 10, 0, 50, 0, 600},
+    {"7i77.0.0.output-03", WAVE_SQUARE, 0.5, 0.5, 22, 0, 600},
+    {"7i77.0.0.output-15", WAVE_SQUARE, 0.5, 0.5, 34, 0, 600},
+};
+
+static const struct event remote_events[] = {
+    {100, 0, REMOTE, 0, REMOTE_INPUT, 5000, 0},        {150, 0, REMOTE, 0, REMOTE_INPUT, 0x8000A * 1000, 0},
+    {200, 0, REMOTE, 0, REMOTE_ANALOG_IN_0, 12000, 0}, {210, 0, REMOTE, 0, REMOTE_ANALOG_IN_3, 3000, 0},
+    {250, 0, REMOTE, 0, REMOTE_ENCODER_0, 40000, 0},   {260, 0, REMOTE, 0, REMOTE_ENCODER_0, 250000, 0},
+    {480, 0, REMOTE, 0, REMOTE_ENCODER_0, 30000, 0},
+};
+
 /* ---- latching by index and by probe, of step generators and of encoders: both edges, armed and not, both at once */
 
 #define LATCH_ENCODER_PROBE(cycle, level)                           \
@@ -770,6 +803,8 @@ const struct scenario scenarios[] = {
     SCENARIO(shots, "7i93", "num_resolvers=0 num_3pwmgens=0 num_rcpwmgens=0 num_xy2mods=0", 400,
              .firmware = TEST_DATA "/firmware/drives_29_48.hex",
              .reached = {{"oneshot.00.out1", 1}, {"oneshot.00.out2", 1}, {"oneshot.00.exttrigger2", 1}}),
+    SCENARIO(remote, "7i96s_7i77d", "sserial_port_0=30xxxxxx", 600, .remote = "7i77", .paced = true, .from = 60,
+             .reached = {{"7i77.0.0.input-19", 1}, {"7i77.0.0.input-02", 1}}),
     SCENARIO(latch, "7i93", "", 500, .firmware = TEST_DATA "/firmware/latch_48.hex",
              .reached = {{"stepgen.00.position-latch", 0.1}, {"encoder.00.position-latched", 0.5}}),
     SCENARIO(muxed, "7i93", "", 500, .firmware = TEST_DATA "/firmware/inmux_48.hex",
