@@ -316,8 +316,7 @@ START_TEST(every_object_of_linuxcncs_driver_exists_in_ours_with_type_direction_a
     snprintf(where, sizeof where, "names/%s/%s", l->card, l->name);
     if (!dropin_table_wanted(where))
         return;
-    /* Firmware of another name is in the same card: "7i96s_7i77d". */
-    snprintf(prefix, sizeof prefix, "hm2_%.*s.0.", (int)strcspn(l->card, "_"), l->card);
+    dropin_prefix(l->card, prefix, sizeof prefix);
     if (!linuxcnc_loads_ours() || !load(l, "hm2_eth"))
         return;
     read_listing(&theirs);

@@ -96,3 +96,9 @@ bool dropin_table_wanted(const char *const where)
     const char *const only = getenv("DROPIN_ONLY");
     return !only || fnmatch(only, where, 0) == 0;
 }
+
+void dropin_prefix(const char *const card, char *const prefix, const size_t size)
+{
+    const int stem = strncmp(card, "7i80", 4) == 0 ? 4 : (int)strcspn(card, "_");
+    snprintf(prefix, size, "hm2_%.*s.0.", stem, card);
+}

@@ -11,6 +11,7 @@
 #include <hm2/bytes.h>
 #include <hm2/lbp16.h>
 
+#include "../dropin_table.h"
 #include "halhost.h"
 #include "sockets.h"
 #include "sserial.h"
@@ -241,10 +242,7 @@ bool driver_load(struct driver *const driver, const char *const card, const char
     const char *const arguments[] = {"board_ip=192.168.1.121", line, driver->parameter};
     const char *const servo_arguments[] = {port};
     snprintf(line, sizeof line, "config=%s", config);
-    /* The names of 7I80DB and 7I80HD say no more than 7i80 (hal-interface 1.3); behind an underscore is the firmware.
-     */
-    const int stem = begins_with(card, "7i80") ? 4 : (int)strcspn(card, "_");
-    snprintf(driver->prefix, sizeof driver->prefix, "hm2_%.*s.0.", stem, card);
+    dropin_prefix(card, driver->prefix, sizeof driver->prefix);
     snprintf(port, sizeof port, "bspi_chans=%sbspi.0", driver->prefix);
     open_host(driver);
     open_card(driver, card);
