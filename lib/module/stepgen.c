@@ -85,11 +85,11 @@ static const struct hm2_point_group groups[] = {
     {.prefix = NULL},
 };
 
-/* Outputs beyond stepgen_width stay GPIO, and so do the index and probe inputs, whose numbers are above any width
- * (hal-interface 2.0). */
+/* Outputs beyond stepgen_width stay GPIO (hal-interface 2.0); the index and probe inputs belong to the generator
+ * whatever the width is, as with LinuxCNC's driver. */
 static bool within_width(const struct hm2_pd *const pd, const struct hm2_setup *const setup)
 {
-    return PIN_NUMBER(pd) <= setup->config->stepgen_width;
+    return !(pd->secondary_pin & HM2_PIN_OUTPUT) || PIN_NUMBER(pd) <= setup->config->stepgen_width;
 }
 
 static const char *output_name(const struct hm2_pd *const pd)

@@ -24,15 +24,21 @@
 /* One word a line, where the reviewed table names it by its number: what follows the card in WHERE. */
 struct line {
     const char *name, *card, *config;
+    const char *firmware; /* NULL = the card's usual one */
 };
+
+#define UARTS    TEST_DATA "/firmware/uart_48.hex"
+#define PKTUARTS TEST_DATA "/hm2_pty/PKTUART_0.hex"
 
 static const struct line lines[] = {
 /* every count: none, one, all, and more than any firmware has */
-#define COUNTS(key)                                                                               \
-    {key "=0", "7i96s", key "=0"}, {key "=1", "7i96s", key "=1"}, {key "=-1", "7i93", key "=-1"}, \
-    {                                                                                             \
-        key "=99", "7i93", key "=99"                                                              \
+#define LINE(name, card, config) \
+    {                            \
+        name, card, config, NULL \
     }
+#define COUNTS(key)                                                                                           \
+    LINE(key "=0", "7i96s", key "=0"), LINE(key "=1", "7i96s", key "=1"), LINE(key "=-1", "7i93", key "=-1"), \
+        LINE(key "=99", "7i93", key "=99")
     COUNTS("num_encoders"),
     COUNTS("num_resolvers"),
     COUNTS("num_pwmgens"),
@@ -52,60 +58,69 @@ static const struct line lines[] = {
     COUNTS("num_leds"),
     COUNTS("num_dplls"),
     /* how numbers are read */
-    {"hex", "7i93", "num_encoders=0x3"},
-    {"octal", "7i93", "num_encoders=07 num_pwmgens=010"},
-    {"plus", "7i93", "num_encoders=+2"},
-    {"garbage-behind", "7i93", "num_encoders=2x"},
-    {"no-number", "7i93", "num_encoders="},
-    {"word-for-number", "7i93", "num_encoders=two"},
-    {"negative", "7i93", "num_encoders=-2"},
-    {"twice", "7i93", "num_encoders=2 num_encoders=4"},
-    {"blanks", "7i93", "  num_encoders=2   num_stepgens=1  "},
-    {"tab", "7i93", "num_encoders=2\tnum_stepgens=1"},
-    {"upper-case", "7i93", "NUM_ENCODERS=2"},
-    {"unknown", "7i96s", "num_wheels=2"},
-    {"stray", "7i96s", "num_encoders"},
+    LINE("hex", "7i93", "num_encoders=0x3"),
+    LINE("octal", "7i93", "num_encoders=07 num_pwmgens=010"),
+    LINE("plus", "7i93", "num_encoders=+2"),
+    LINE("garbage-behind", "7i93", "num_encoders=2x"),
+    LINE("no-number", "7i93", "num_encoders="),
+    LINE("word-for-number", "7i93", "num_encoders=two"),
+    LINE("negative", "7i93", "num_encoders=-2"),
+    LINE("twice", "7i93", "num_encoders=2 num_encoders=4"),
+    LINE("blanks", "7i93", "  num_encoders=2   num_stepgens=1  "),
+    LINE("tab", "7i93", "num_encoders=2\tnum_stepgens=1"),
+    LINE("upper-case", "7i93", "NUM_ENCODERS=2"),
+    LINE("unknown", "7i96s", "num_wheels=2"),
+    LINE("stray", "7i96s", "num_encoders"),
     /* step generators, raw access, firmware */
-    {"width-0", "7i96s", "stepgen_width=0"},
-    {"width-1", "7i96s", "stepgen_width=1"},
-    {"width-2", "7i96s", "stepgen_width=2"},
-    {"width-8", "7i96s", "stepgen_width=8"},
-    {"width-9", "7i96s", "stepgen_width=9"},
-    {"raw", "7i96s", "enable_raw"},
-    {"raw-value", "7i96s", "enable_raw=1"},
-    {"raw-twice", "7i96s", "enable_raw enable_raw"},
-    {"firmware", "7i96s", "firmware=hm2/7i96s/7i96s_d.bit"},
-    {"firmware-empty", "7i96s", "firmware="},
-    {"adc", "7i96s", "enable_adc"},
+    LINE("width-0", "7i96s", "stepgen_width=0"),
+    LINE("width-1", "7i96s", "stepgen_width=1"),
+    LINE("width-2", "7i96s", "stepgen_width=2"),
+    LINE("width-8", "7i96s", "stepgen_width=8"),
+    LINE("width-9", "7i96s", "stepgen_width=9"),
+    LINE("raw", "7i96s", "enable_raw"),
+    LINE("raw-value", "7i96s", "enable_raw=1"),
+    LINE("raw-twice", "7i96s", "enable_raw enable_raw"),
+    LINE("firmware", "7i96s", "firmware=hm2/7i96s/7i96s_d.bit"),
+    LINE("firmware-empty", "7i96s", "firmware="),
+    LINE("adc", "7i96s", "enable_adc"),
     /* smart serial */
-    {"sserial-all", "7i96s", "sserial_port_0=00000000"},
-    {"sserial-one", "7i96s", "sserial_port_0=0"},
-    {"sserial-mixed", "7i96s", "sserial_port_0=0x2xxxxx"},
-    {"sserial-none", "7i96s", "sserial_port_0=xxxxxxxx"},
-    {"sserial-second", "7i96s", "sserial_port_1=00"},
-    {"sserial-second-none", "7i96s", "sserial_port_1=xxxxxxxx"},
-    {"sserial-last", "7i96s", "sserial_port_3=0"},
-    {"sserial-beyond", "7i96s", "sserial_port_4=0"},
-    {"sserial-many", "7i96s", "sserial_port_0=000000000"},
-    {"sserial-letters", "7i96s", "sserial_port_0=0y"},
-    {"sserial-upper-case", "7i96s", "sserial_port_0=0XXXXXXX"},
-    {"sserial-empty", "7i96s", "sserial_port_0="},
-    {"sserial-no-port", "7i96s", "sserial_port_=0"},
-    {"sserial-7i93", "7i93", "sserial_port_0=00000000"},
+    LINE("sserial-all", "7i96s", "sserial_port_0=00000000"),
+    LINE("sserial-one", "7i96s", "sserial_port_0=0"),
+    LINE("sserial-mixed", "7i96s", "sserial_port_0=0x2xxxxx"),
+    LINE("sserial-none", "7i96s", "sserial_port_0=xxxxxxxx"),
+    LINE("sserial-second", "7i96s", "sserial_port_1=00"),
+    LINE("sserial-second-none", "7i96s", "sserial_port_1=xxxxxxxx"),
+    LINE("sserial-last", "7i96s", "sserial_port_3=0"),
+    LINE("sserial-beyond", "7i96s", "sserial_port_4=0"),
+    LINE("sserial-many", "7i96s", "sserial_port_0=000000000"),
+    LINE("sserial-letters", "7i96s", "sserial_port_0=0y"),
+    LINE("sserial-upper-case", "7i96s", "sserial_port_0=0XXXXXXX"),
+    LINE("sserial-empty", "7i96s", "sserial_port_0="),
+    LINE("sserial-no-port", "7i96s", "sserial_port_=0"),
+    LINE("sserial-7i93", "7i93", "sserial_port_0=00000000"),
     /* absolute encoders, which no card here has */
-    {"ssi", "7i96s", "ssi_chan_0=pad%1pposition%24g"},
-    {"ssi-typed", "7i96s", "ssi_chan_0=position%24ge"},
-    {"ssi-beyond", "7i96s", "ssi_chan_32=position%24ge"},
-    {"ssi-bad", "7i96s", "ssi_chan_0=%%"},
-    {"ssi-empty", "7i96s", "ssi_chan_0="},
-    {"biss", "7i96s", "biss_chan_1=position%22e"},
-    {"fanuc", "7i96s", "fanuc_chan_0=AA64"},
+    LINE("ssi", "7i96s", "ssi_chan_0=pad%1pposition%24g"),
+    LINE("ssi-typed", "7i96s", "ssi_chan_0=position%24ge"),
+    LINE("ssi-beyond", "7i96s", "ssi_chan_32=position%24ge"),
+    LINE("ssi-bad", "7i96s", "ssi_chan_0=%%"),
+    LINE("ssi-empty", "7i96s", "ssi_chan_0="),
+    LINE("biss", "7i96s", "biss_chan_1=position%22e"),
+    LINE("fanuc", "7i96s", "fanuc_chan_0=AA64"),
     /* a card with nothing but ports */
-    {"ports", "7i80hd-16", ""},
-    {"ports-raw", "7i80hd-16", "enable_raw num_leds=0 num_encoders=8"},
+    LINE("ports", "7i80hd-16", ""),
+    LINE("ports-raw", "7i80hd-16", "enable_raw num_leds=0 num_encoders=8"),
+    /* serial ports, which have functions and hardly any points */
+    {"uarts", "7i93", "", UARTS},
+    {"no-uarts", "7i93", "num_uarts=0", UARTS},
+    {"two-uarts", "7i93", "num_uarts=2", UARTS},
+    {"99-uarts", "7i93", "num_uarts=99", UARTS},
+    {"pktuarts", "7i80hd-16", "", PKTUARTS},
+    {"no-pktuarts", "7i80hd-16", "num_pktuarts=0", PKTUARTS},
+    {"one-pktuart", "7i80hd-16", "num_pktuarts=1", PKTUARTS},
+    {"99-pktuarts", "7i80hd-16", "num_pktuarts=99", PKTUARTS},
     /* nothing */
-    {"empty", "7i96s", ""},
-    {"only-blanks", "7i96s", "   "},
+    LINE("empty", "7i96s", ""),
+    LINE("only-blanks", "7i96s", "   "),
 };
 #define LINES (sizeof lines / sizeof lines[0])
 
@@ -126,8 +141,11 @@ static unsigned problems;
 static void load(const struct line *const line, const enum driver_kind kind, const char *const parameter,
                  struct record *const record)
 {
-    struct driver driver = {
-        .kind = kind, .parameter = parameter, .messages = record->messages, .messages_size = MESSAGES};
+    struct driver driver = {.kind = kind,
+                            .parameter = parameter,
+                            .firmware = line->firmware,
+                            .messages = record->messages,
+                            .messages_size = MESSAGES};
     record->loaded = driver_load(&driver, line->card, line->config);
     ck_assert_uint_lt(driver.point_count, MAX_POINTS);
     for (size_t i = 0; i < driver.point_count; i++) {
@@ -298,7 +316,7 @@ static const struct {
 
 START_TEST(a_module_parameter_is_used_or_told_to_have_no_effect)
 {
-    static const struct line line = {"", "7i96s", ""};
+    static const struct line line = LINE("", "7i96s", "");
     const char *const parameter = parameters[_i].parameter, *const sentence = parameters[_i].sentence;
     char name[32];
     snprintf(name, sizeof name, "%.*s", (int)strcspn(parameter, "="), parameter);

@@ -33,6 +33,7 @@ struct load {
 #define SSERIALB TEST_DATA "/firmware/sserialb_51.hex"
 #define DRIVES   TEST_DATA "/firmware/drives_29_48.hex"
 #define INMUX    TEST_DATA "/firmware/inmux_48.hex"
+#define LATCH    TEST_DATA "/firmware/latch_48.hex"
 
 static const struct load loads[] = {
     {"7i96s", "default", "", {NULL}},
@@ -82,6 +83,8 @@ static const struct load loads[] = {
      {"--firmware", ABSOLUTE}},
     {"7i93", "no-absolute", "", {"--firmware", ABSOLUTE}},
     {"7i93", "inmux", "", {"--firmware", INMUX}},
+    {"7i93", "latch", "", {"--firmware", LATCH}},
+    {"7i93", "latch-narrow", "stepgen_width=1", {"--firmware", LATCH}},
     {"7i93", "drives", "", {"--firmware", DRIVES}},
     {"7i93",
      "fewer-drives",
@@ -311,8 +314,9 @@ START_TEST(every_object_of_linuxcncs_driver_exists_in_ours_with_type_direction_a
 {
     const struct load *const l = &loads[_i];
     snprintf(where, sizeof where, "names/%s/%s", l->card, l->name);
-    /* Firmware of another name is in the same card: "7i96s_7i77d". */
-    snprintf(prefix, sizeof prefix, "hm2_%.*s.0.", (int)strcspn(l->card, "_"), l->card);
+    if (!dropin_table_wanted(where))
+        return;
+    dropin_prefix(l->card, prefix, sizeof prefix);
     if (!linuxcnc_loads_ours() || !load(l, "hm2_eth"))
         return;
     read_listing(&theirs);

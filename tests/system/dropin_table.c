@@ -8,7 +8,7 @@
 #include <string.h>
 #include <sys/mman.h>
 
-#define MAX_ROWS 256u
+#define MAX_ROWS 512u
 
 struct row {
     char where[64], what[16], name[64], limit[16];
@@ -89,4 +89,16 @@ unsigned dropin_table_unused(const char *const scope)
         unused++;
     }
     return unused;
+}
+
+bool dropin_table_wanted(const char *const where)
+{
+    const char *const only = getenv("DROPIN_ONLY");
+    return !only || fnmatch(only, where, 0) == 0;
+}
+
+void dropin_prefix(const char *const card, char *const prefix, const size_t size)
+{
+    const int stem = strncmp(card, "7i80", 4) == 0 ? 4 : (int)strcspn(card, "_");
+    snprintf(prefix, size, "hm2_%.*s.0.", stem, card);
 }

@@ -8,6 +8,7 @@
 #define TEST_DROPIN_TABLE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 /* Read the table, into memory that forked tests share. Call it before the tests run; a bad table ends the program. */
 void dropin_table_load(const char *path);
@@ -20,5 +21,13 @@ const char *dropin_table_allows(const char *where, const char *what, const char 
 /* Print every row of a scope ("names", "loads", "run"), which is what its first column begins with, and that allowed
  * nothing since the table was loaded; returns how many these are. */
 unsigned dropin_table_unused(const char *scope);
+
+/* For looking closer: DROPIN_ONLY=PATTERN in the environment runs only what matches it, a shell pattern for what
+ * `where` is: DROPIN_ONLY='names/7i93/absolute', DROPIN_ONLY='*motion'. True for all when it is not set. */
+bool dropin_table_wanted(const char *where);
+
+/* What the names of a simulated card's objects begin with, "hm2_7i96s.0.". Those of 7I80DB and 7I80HD say no more than
+ * 7i80 (hal-interface 1.3); behind an underscore is the firmware: "7i96s_7i77d". */
+void dropin_prefix(const char *card, char *prefix, size_t size);
 
 #endif

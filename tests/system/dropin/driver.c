@@ -11,8 +11,10 @@
 #include <hm2/bytes.h>
 #include <hm2/lbp16.h>
 
+#include "../dropin_table.h"
 #include "halhost.h"
 #include "sockets.h"
+#include "sserial.h"
 #include "state.h"
 
 #define WRITE_NS  (DRIVER_PERIOD_NS * 4 / 10)
@@ -211,6 +213,8 @@ static void open_card(struct driver *const driver, const char *const card)
     }
     if (sim_card_new(&driver->card, &options, &diag) != 0)
         ck_abort_msg("no card: %s", diag.text);
+    if (driver->remote && sim_sserial_plug(driver->card, 0, 0, driver->remote, 1, &diag) != 0)
+        ck_abort_msg("no remote: %s", diag.text);
     if (driver->has_7i65)
         ck_assert_int_eq(sim_7i65_new(&driver->servo, driver->card, 0), 0);
     ck_assert_int_eq(sim_net_new(&driver->net, driver->card, NULL), 0);
@@ -238,10 +242,7 @@ bool driver_load(struct driver *const driver, const char *const card, const char
     const char *const arguments[] = {"board_ip=192.168.1.121", line, driver->parameter};
     const char *const servo_arguments[] = {port};
     snprintf(line, sizeof line, "config=%s", config);
-    /* The names of 7I80DB and 7I80HD say no more than 7i80 (hal-interface 1.3); behind an underscore is the firmware.
-     */
-    const int stem = begins_with(card, "7i80") ? 4 : (int)strcspn(card, "_");
-    snprintf(driver->prefix, sizeof driver->prefix, "hm2_%.*s.0.", stem, card);
+    dropin_prefix(card, driver->prefix, sizeof driver->prefix);
     snprintf(port, sizeof port, "bspi_chans=%sbspi.0", driver->prefix);
     open_host(driver);
     open_card(driver, card);

@@ -32,8 +32,9 @@ struct driver {
     char prefix[32];       /* "hm2_7i96s.0." */
     const char *firmware;  /* of the card instead of the usual one: a file of tests/data; or NULL */
     enum sim_sources sources;
-    bool has_7i65; /* at the card's first buffered SPI port, and its component is loaded, too */
-    bool paced;    /* its processor takes its time, so that what is read depends on the place in the packet */
+    const char *remote; /* daughter card at channel 0 of the first smart-serial port ("7i77"), or NULL */
+    bool has_7i65;      /* at the card's first buffered SPI port, and its component is loaded, too */
+    bool paced;         /* its processor takes its time, so that what is read depends on the place in the packet */
     struct sim_card *card;
     struct sim_net *net;
     struct sim_7i65 *servo; /* NULL without */
@@ -56,8 +57,8 @@ struct driver {
 bool driver_available(enum driver_kind kind);
 /* The files of a driver, NULL-terminated: full paths, in static storage. */
 const char *const *driver_files(enum driver_kind kind);
-/* Load. kind, parameter, firmware, sources, has_7i65, paced, messages and on_write are set by the caller. False when
- * the load failed: the messages say why.
+/* Load. kind, parameter, firmware, sources, remote, has_7i65, paced, messages and on_write are set by the caller. False
+ * when the load failed: the messages say why.
  */
 bool driver_load(struct driver *driver, const char *card, const char *config);
 void driver_unload(struct driver *driver);

@@ -7,6 +7,7 @@
 
 #include <hm2/idrom.h>
 
+#include "sserial.h"
 #include "state.h"
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
@@ -169,6 +170,16 @@ static void show_absolute(const struct driver *const driver, const struct event 
     ck_assert_int_eq(sim_card_absolute(driver->card, (uint8_t)event->a, (unsigned)event->b, &encoder), 0);
 }
 
+static void set_remote_field(const struct driver *const driver, const struct event *const event)
+{
+    static const char *const fields[] = {[REMOTE_INPUT] = "Input",
+                                         [REMOTE_ANALOG_IN_0] = "AnalogIn0",
+                                         [REMOTE_ANALOG_IN_3] = "AnalogIn3",
+                                         [REMOTE_ENCODER_0] = "Enc0"};
+    struct remote *const remote = sim_sserial_remote(driver->card, 0, (unsigned)event->a);
+    ck_assert_int_eq(remote_set(remote, fields[event->b], event->c / 1000.0), 0);
+}
+
 /* What happens to card and network while an event lasts; true when write() is left out. */
 static bool apply_event(const struct event *const event, struct driver *const driver)
 {
@@ -209,6 +220,9 @@ static bool apply_event(const struct event *const event, struct driver *const dr
         ck_assert_int_eq(sim_card_drive_input(driver->card, clk, (uint8_t)event->a, (unsigned)event->b,
                                               (uint8_t)event->c, event->d ? SIM_HIGH : SIM_LOW),
                          0);
+        break;
+    case REMOTE:
+        set_remote_field(driver, event);
         break;
     case POWER_CYCLE:
         sim_card_power_cycle(driver->card);

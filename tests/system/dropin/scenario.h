@@ -43,6 +43,7 @@ enum action {
     ABSOLUTE_GRAY, /* the same in Gray code */
     INPUT,         /* input pin c of instance b of module a is at level d */
     POWER_CYCLE,   /* of the card, in this cycle */
+    REMOTE,        /* field b (enum remote_field) of the remote at channel a gets c thousandths */
 };
 
 struct event {
@@ -50,6 +51,8 @@ struct event {
     enum action action;
     int a, b, c, d;
 };
+
+enum remote_field { REMOTE_INPUT, REMOTE_ANALOG_IN_0, REMOTE_ANALOG_IN_3, REMOTE_ENCODER_0 };
 
 /* A value that a point must have reached at least in some cycle, or the script does not test what it says. */
 struct milestone {
@@ -73,6 +76,7 @@ struct scenario {
     bool paced;                               /* the card's processor takes its time */
     const char *firmware;                     /* of the card instead of the usual one, or NULL */
     enum sim_sources sources;                 /* that the card's firmware is made from */
+    const char *remote;                       /* see struct driver */
     unsigned from;                            /* nothing is compared before this cycle */
     bool has_7i65;                            /* at the card's first buffered SPI port */
     struct milestone reached[MAX_MILESTONES]; /* ends with a point NULL, or when full */

@@ -4,7 +4,16 @@
 
 #include <hm2/idrom.h>
 
-enum { TPPWM_FAULT = 0x08, INMUX_INPUT = 0x40 }; /* input pins (register map 4.1; lib/sim/sim_inm.c) */
+/* Input pins (register map 4.1; lib/sim/sim_inm.c). */
+enum {
+    TPPWM_FAULT = 0x08,
+    ONESHOT_TRIGGER = 0x01,
+    ENCODER_PROBE = 0x05,
+    STEPGEN_INDEX = 0x09,
+    STEPGEN_PROBE = 0x0A,
+    INMUX_INPUT = 0x40
+};
+
 #define LOCKED 250 /* cycle in which the DPLL has found its phase, whatever the load took */
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
@@ -517,6 +526,167 @@ static const struct event drives_events[] = {
     {360, 0, INPUT, HM2_GTAG_TPPWM, 0, TPPWM_FAULT, 0},
 };
 
+/* ---- a 7I77: field inputs and outputs, analog inputs and encoders of one remote, analog outputs of the other. Smart
+ * serial is set going by the first cycles; nothing is compared before. */
+
+static const struct setting remote_settings[] = {
+    {0, "watchdog.timeout_ns", 20000000},
+    {0, "7i77.0.1.analogout0-scalemax", 20},
+    {0, "7i77.0.1.analogout0-minlim", -15},
+    {0, "7i77.0.1.analogout1-maxlim", 5},
+    {70, "7i77.0.1.analogena", 1},
+    {75, "7i77.0.1.spinena", 1},
+    {300, "7i77.0.0.output-03-invert", 1},
+    {350, "7i77.0.1.analogout0-scalemax", 10},
+    {400, "7i77.0.0.analogin0-scalemax", 20},
+    {400, "7i77.0.0.enc0.scale", -4},
+    {450, "7i77.0.0.enc0.reset", 1},
+    {460, "7i77.0.0.enc0.reset", 0},
+};
+
+static const struct wave remote_waves[] = {
+    {"7i77.0.1.analogout0", WAVE_SINE, 22, 0, 200, 0, 600},
+    {"7i77.0.1.analogout1", WAVE_TRIANGLE, 9, 1, 130, 0, 600},
+    {"7i77.0.1.analogout5", WAVE_SQUARE, 10, 0, 50, 0, 600},
+    {"7i77.0.0.output-03", WAVE_SQUARE, 0.5, 0.5, 22, 0, 600},
+    {"7i77.0.0.output-15", WAVE_SQUARE, 0.5, 0.5, 34, 0, 600},
+};
+
+static const struct event remote_events[] = {
+    {100, 0, REMOTE, 0, REMOTE_INPUT, 5000, 0},        {150, 0, REMOTE, 0, REMOTE_INPUT, 0x8000A * 1000, 0},
+    {200, 0, REMOTE, 0, REMOTE_ANALOG_IN_0, 12000, 0}, {210, 0, REMOTE, 0, REMOTE_ANALOG_IN_3, 3000, 0},
+    {250, 0, REMOTE, 0, REMOTE_ENCODER_0, 40000, 0},   {260, 0, REMOTE, 0, REMOTE_ENCODER_0, 250000, 0},
+    {480, 0, REMOTE, 0, REMOTE_ENCODER_0, 30000, 0},
+};
+
+/* ---- latching by index and by probe, of step generators and of encoders: both edges, armed and not, both at once */
+
+#define LATCH_ENCODER_PROBE(cycle, level)                           \
+    {                                                               \
+        cycle, 0, INPUT, HM2_GTAG_ENCODER, 0, ENCODER_PROBE, level, \
+    }
+#define LATCH_STEPGEN(cycle, unit, pin, level)               \
+    {                                                        \
+        cycle, 0, INPUT, HM2_GTAG_STEPGEN, unit, pin, level, \
+    }
+
+static const struct setting latch_settings[] = {
+    STEPGEN("00", 1000, 100, 2000, 2000, 2000),
+    STEPGEN("01", -500, 100, 2000, 2000, 2000),
+    {0, "watchdog.timeout_ns", 20000000},
+    {0, "encoder.00.scale", 400},
+    {5, "stepgen.00.control-type", 1},
+    {5, "stepgen.01.control-type", 1},
+    {5, "stepgen.00.velocity-cmd", 7},
+    {5, "stepgen.01.velocity-cmd", 3},
+    {5, "stepgen.00.enable", 1},
+    {5, "stepgen.01.enable", 1},
+    {50, "stepgen.00.index-enable", 1},
+    {50, "stepgen.01.probe-enable", 1},
+    {50, "encoder.00.probe-enable", 1},
+    {120, "stepgen.00.index-invert", 1},
+    {120, "stepgen.01.probe-invert", 1},
+    {120, "encoder.00.probe-invert", 1},
+    {150, "stepgen.00.index-enable", 1},
+    {150, "stepgen.01.probe-enable", 1},
+    {150, "encoder.00.probe-enable", 1},
+    {220, "stepgen.00.velocity-cmd", -7},
+    {300, "stepgen.00.probe-enable", 1},
+    {300, "stepgen.01.index-enable", 1},
+    {400, "encoder.00.index-enable", 1},
+};
+
+static const struct wave latch_waves[] = {
+    {"led.CR03", WAVE_SQUARE, 0.5, 0.5, 100, 0, 500},
+};
+
+static const struct event latch_events[] = {
+    {1, 500, TURN, 0, 4, 0, 0},
+    /* high and low while nothing is armed, then the falling edges, then the rising ones */
+    LATCH_STEPGEN(20, 0, STEPGEN_INDEX, 1),
+    LATCH_STEPGEN(30, 0, STEPGEN_INDEX, 0),
+    LATCH_STEPGEN(40, 0, STEPGEN_INDEX, 1),
+    LATCH_STEPGEN(80, 0, STEPGEN_INDEX, 0),
+    LATCH_STEPGEN(180, 0, STEPGEN_INDEX, 1),
+    LATCH_STEPGEN(190, 0, STEPGEN_INDEX, 0),
+    LATCH_STEPGEN(20, 1, STEPGEN_PROBE, 1),
+    LATCH_STEPGEN(85, 1, STEPGEN_PROBE, 0),
+    LATCH_STEPGEN(185, 1, STEPGEN_PROBE, 1),
+    LATCH_STEPGEN(200, 1, STEPGEN_PROBE, 0),
+    LATCH_STEPGEN(310, 0, STEPGEN_PROBE, 1),
+    LATCH_STEPGEN(330, 0, STEPGEN_PROBE, 0),
+    LATCH_STEPGEN(310, 1, STEPGEN_INDEX, 1),
+    LATCH_STEPGEN(340, 1, STEPGEN_INDEX, 0),
+    LATCH_ENCODER_PROBE(20, 1),
+    LATCH_ENCODER_PROBE(90, 0),
+    LATCH_ENCODER_PROBE(190, 1),
+    LATCH_ENCODER_PROBE(210, 0),
+    {420, 0, INDEX, 0, 1, 0, 0},
+    {430, 0, INDEX, 0, 0, 0, 0},
+};
+
+/* ---- one-shots: every source of a trigger, both edges, filters, pulses that begin anew, reset, and impossible
+ * settings. A cycle reads 0.6 ms after it wrote; no pulse ends near that. */
+
+static const struct setting shots_settings[] = {
+    {0, "watchdog.timeout_ns", 20000000},
+    {5, "oneshot.00.width1", 2.3},
+    {5, "oneshot.00.width2", 5.3},
+    {5, "oneshot.00.filter1", 0.05},
+    {5, "oneshot.00.filter2", 1.55},
+    {5, "oneshot.00.trigger_on_rise1", 1},
+    {5, "oneshot.00.enable1", 1},
+    {10, "oneshot.00.trigger_select1", 1},
+    {20, "oneshot.00.swtrigger1", 1},
+    {25, "oneshot.00.swtrigger1", 0},
+    {30, "oneshot.00.trigger_on_fall1", 1},
+    {35, "oneshot.00.swtrigger1", 1},
+    {40, "oneshot.00.swtrigger1", 0},
+    {50, "oneshot.00.width1", 9.3},
+    {60, "oneshot.00.swtrigger1", 1}, /* and ended by a reset */
+    {63, "oneshot.00.reset1", 1},
+    {64, "oneshot.00.reset1", 0},
+    {70, "oneshot.00.retriggerable1", 1},
+    {80, "oneshot.00.swtrigger1", 0}, /* begins anew in its middle */
+    {85, "oneshot.00.swtrigger1", 1},
+    {110, "oneshot.00.trigger_select1", 2},
+    {120, "oneshot.00.trigger_select2", 5}, /* the first pulse triggers the second, with its end */
+    {120, "oneshot.00.trigger_on_fall2", 1},
+    {120, "oneshot.00.enable2", 1},
+    {180, "oneshot.00.trigger_select2", 2},
+    {220, "oneshot.00.enable1", 0}, /* no trigger is obeyed */
+    {220, "oneshot.00.swtrigger1", 1},
+    {230, "oneshot.00.enable1", 1},
+    {240, "oneshot.00.rate", 500}, /* and a pulse that is longer than the pause between triggers */
+    {240, "oneshot.00.trigger_select1", 4},
+    {260, "oneshot.00.trigger_select1", 0},
+    {270, "oneshot.00.dpll_timer_number", 1},
+    {270, "oneshot.00.trigger_select1", 3},
+    {290, "oneshot.00.trigger_select1", 0},
+    {300, "oneshot.00.dpll_timer_number", 7}, /* no such timer */
+    {310, "oneshot.00.trigger_select1", 9},   /* no such source */
+    {320, "oneshot.00.width1", -1},
+    {320, "oneshot.00.filter1", -1},
+    {330, "oneshot.00.width1", 1e9},
+    {330, "oneshot.00.filter1", 1e9},
+    {340, "oneshot.00.rate", -1},
+    {350, "oneshot.00.rate", 1e12},
+};
+
+static const struct wave shots_waves[] = {
+    {"led.CR03", WAVE_SQUARE, 0.5, 0.5, 100, 0, 400},
+};
+
+#define TRIGGER(cycle, shot, level)                                              \
+    {                                                                            \
+        cycle, 0, INPUT, HM2_GTAG_ONESHOT, 0, ONESHOT_TRIGGER + (shot)-1, level, \
+    }
+
+static const struct event shots_events[] = {
+    TRIGGER(15, 1, 1),  TRIGGER(18, 1, 0),  TRIGGER(115, 1, 1), TRIGGER(118, 1, 0), TRIGGER(140, 1, 1),
+    TRIGGER(160, 1, 0), TRIGGER(190, 2, 1), TRIGGER(191, 2, 0), TRIGGER(200, 2, 1), TRIGGER(210, 2, 0),
+};
+
 /* ---- inputs behind multiplexers: levels, filters, slow and fast, a handwheel, settings good and impossible */
 
 #define MUXED(cycle, input, level)                                          \
@@ -630,6 +800,13 @@ const struct scenario scenarios[] = {
              .reached = {{"fanuc.00.crc", 0.5}, {"fanuc.00.encoder.count", 1000}, {"fanuc.01.low", 65000}}),
     SCENARIO(drives, "7i93", "num_resolvers=0 num_oneshots=0", 600, .firmware = TEST_DATA "/firmware/drives_29_48.hex",
              .reached = {{"3pwmgen.00.fault", 1}, {"xy2mod.00.posx-fb", 0.009}}),
+    SCENARIO(shots, "7i93", "num_resolvers=0 num_3pwmgens=0 num_rcpwmgens=0 num_xy2mods=0", 400,
+             .firmware = TEST_DATA "/firmware/drives_29_48.hex",
+             .reached = {{"oneshot.00.out1", 1}, {"oneshot.00.out2", 1}, {"oneshot.00.exttrigger2", 1}}),
+    SCENARIO(remote, "7i96s_7i77d", "sserial_port_0=30xxxxxx", 600, .remote = "7i77", .paced = true, .from = 60,
+             .reached = {{"7i77.0.0.input-19", 1}, {"7i77.0.0.input-02", 1}}),
+    SCENARIO(latch, "7i93", "", 500, .firmware = TEST_DATA "/firmware/latch_48.hex",
+             .reached = {{"stepgen.00.position-latch", 0.1}, {"encoder.00.position-latched", 0.5}}),
     SCENARIO(muxed, "7i93", "", 500, .firmware = TEST_DATA "/firmware/inmux_48.hex",
              .reached = {{"inmux.00.enc0-count", 5}, {"inmux.00.input-12", 1}, {"inmux.00.scan_width", 16}}),
     SCENARIO(paced, "7i96s", "", 2000, .paced = true, .reached = {{"encoder.00.count", 15000}}),
