@@ -4,6 +4,7 @@
  *
  *     bench_cycle time  DRIVER PREFIX CYCLES FOLDER [component arguments...]
  *     bench_cycle count DRIVER PREFIX CYCLES FOLDER [component arguments...]
+ *     bench_cycle misses DRIVER PREFIX CYCLES FOLDER [component arguments...]
  *     bench_cycle echo  ADDRESS PORT REQUEST_BYTES REPLY_BYTES WRITE_BYTES CYCLES
  *     bench_cycle serve ADDRESS PORT REQUEST_BYTES REPLY_BYTES
  *
@@ -11,11 +12,13 @@
  * with "*N" behind it the first of N cards of its kind, whose .read and then .write stand in one thread. The component
  * is loaded into the small HAL host in this process; a 1 kHz thread calls PREFIX.read and PREFIX.write with marks of
  * our own around them. Instructions are counted by single-stepping that thread from another process: exact, and without
- * the kernel's share. `echo` exchanges packets of the same sizes with `serve`, with nothing but the system calls.
+ * the kernel's share. `misses` counts the cycles that failed, with the driver's own deadline. `echo` exchanges packets
+ * of the same sizes with `serve`, with nothing but the system calls.
  */
 #include <errno.h>
 #include <poll.h>
 #include <signal.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -85,6 +88,8 @@ static int64_t *read_times, *write_times, *read_thread_times;
 static int wanted_cycles, seen_cycles;
 static hal_u32_t **errors; /* of each card */
 static unsigned cards = 1;
+static bool own_deadline;
+static unsigned first_errors; /* of the warm-up */
 
 static void mark_begin(void *const arg, const long period)
 {
@@ -119,6 +124,8 @@ static void mark_end(void *const arg, const long period)
     for (unsigned i = 0; i < cards; i++)
         sum += *errors[i];
     shared->errors = sum;
+    if (at < 0)
+        first_errors = sum;
     shared->cycle++;
 }
 
@@ -192,12 +199,13 @@ static void enable_all(const char *const prefix, const char *const module)
     }
 }
 
-/* All that the driver has is in use: axes under position control, PWM on. Replies may take as long as they want, and
- * nothing bites, because a driver that is stepped through is slow and a busy machine is late. */
+/* All that the driver has is in use: axes under position control, PWM on. Replies may take as long as they want (where
+ * misses are counted, any number may be missed), and nothing bites, because a driver that is stepped through is slow
+ * and a busy machine is late. */
 static void put_to_work(const char *const prefix, const unsigned card)
 {
     char text[128];
-    setp(prefix, "packet-read-timeout", "2000000000");
+    setp(prefix, own_deadline ? "packet-error-limit" : "packet-read-timeout", "2000000000");
     setp(prefix, "watchdog.timeout_ns", "4000000000");
     snprintf(text, sizeof text, "net errors.%u %s.packet-error-total => mark.errors.%u\n", card, prefix, card);
     command(text);
@@ -303,6 +311,16 @@ static int measure_time(const int cycles, char **const argv, const int count)
     }
     print_cycle_times(read_times, write_times, cycles);
     print_times("read_thread", read_thread_times, cycles);
+    return 0;
+}
+
+static int count_misses(const int cycles, char **const argv, const int count)
+{
+    own_deadline = true;
+    start_driver(argv[0], argv[1], argv[3], argv + 4, count - 4);
+    wait_for_cycles(cycles + WARM_UP);
+    stop_driver();
+    printf("missed=%u\n", shared->errors - first_errors);
     return 0;
 }
 
@@ -451,6 +469,8 @@ int main(const int argc, char **const argv)
         return 1;
     if (argc >= 6 && strcmp(argv[1], "time") == 0)
         return measure_time((int)strtol(argv[4], NULL, 10), argv + 2, argc - 2);
+    if (argc >= 6 && strcmp(argv[1], "misses") == 0)
+        return count_misses((int)strtol(argv[4], NULL, 10), argv + 2, argc - 2);
     if (argc >= 6 && strcmp(argv[1], "count") == 0)
         return measure_instructions((int)strtol(argv[4], NULL, 10), argv + 2, argc - 2);
     if (argc == 8 && strcmp(argv[1], "echo") == 0)

@@ -4,15 +4,18 @@
  *
  *     bench_receive WAY ADDRESS PORT REQUEST_BYTES REPLY_BYTES CYCLES
  *
- * Prints the wall time and the processor time of sending and receiving; WAY is one of the names in the table at the
- * end. The peer is `bench_cycle serve`. The packet ways receive from a ring that is shared with the kernel
- * (AF_PACKET, TPACKET_V2), ahead of IP and UDP; they send through the UDP socket, whose own copy of the reply a filter
- * drops.
+ * Prints the wall time and the processor time of sending and receiving; with 0 cycles, it is only seen whether the way
+ * can be used here. WAY is one of the names in the table at the end. The peer is `bench_cycle serve`. The packet ways
+ * receive from a ring that is shared with the kernel (AF_PACKET, TPACKET_V2), ahead of IP and UDP; they send through
+ * the UDP socket, whose own copy of the reply a filter drops. The xdp ways do the same with a ring of AF_XDP (xdp.h),
+ * filled before there is a socket buffer (native) or behind the network card's driver.
  */
 #include <errno.h>
+#include <ifaddrs.h>
 #include <linux/filter.h>
 #include <linux/if_packet.h>
 #include <net/ethernet.h>
+#include <net/if.h>
 #include <netinet/ip.h>
 #include <netinet/udp.h>
 #include <poll.h>
@@ -27,6 +30,7 @@
 #include <unistd.h>
 
 #include "timing.h"
+#include "xdp.h"
 
 #define FRAME_BYTES 2048u
 #define FRAMES      64u
@@ -34,9 +38,10 @@
 
 static struct {
     int fd, packet_fd;
-    uint16_t port; /* ours, network order */
+    struct sockaddr_in own;
     uint8_t *ring;
     unsigned next;
+    struct xdp xdp;
     size_t reply;
 } io;
 
@@ -117,6 +122,12 @@ static void open_busy_sleep(void)
     open_timeout();
 }
 
+/* Ahead of IP and UDP, a reply has their headers in front of it. */
+static bool is_reply(const size_t frame_len)
+{
+    return frame_len >= sizeof(struct ether_header) + sizeof(struct iphdr) + sizeof(struct udphdr) + io.reply;
+}
+
 static void open_packet(void)
 {
     const struct tpacket_req ring = {
@@ -125,7 +136,7 @@ static void open_packet(void)
     /* IPv4 without options, UDP, for our port */
     struct sock_filter ours[] = {
         BPF_STMT(BPF_LD | BPF_B | BPF_ABS, 23), BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, IPPROTO_UDP, 0, 3),
-        BPF_STMT(BPF_LD | BPF_H | BPF_ABS, 36), BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, ntohs(io.port), 0, 1),
+        BPF_STMT(BPF_LD | BPF_H | BPF_ABS, 36), BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, ntohs(io.own.sin_port), 0, 1),
         BPF_STMT(BPF_RET | BPF_K, FRAME_BYTES), BPF_STMT(BPF_RET | BPF_K, 0),
     };
     struct sock_filter none[] = {BPF_STMT(BPF_RET | BPF_K, 0)};
@@ -152,7 +163,7 @@ static bool take_frame(void)
     const size_t len = head->tp_len;
     io.next = (io.next + 1) % FRAMES;
     __atomic_store_n(&head->tp_status, TP_STATUS_KERNEL, __ATOMIC_RELEASE);
-    return len >= sizeof(struct ether_header) + sizeof(struct iphdr) + sizeof(struct udphdr) + io.reply;
+    return is_reply(len);
 }
 
 static bool receive_packet_wait(const int64_t deadline_ns)
@@ -169,6 +180,57 @@ static bool receive_packet_spin(const int64_t deadline_ns)
     return got;
 }
 
+static unsigned own_interface(void)
+{
+    struct ifaddrs *all, *at;
+    unsigned number = 0;
+    if (getifaddrs(&all) != 0)
+        fail("getifaddrs");
+    for (at = all; at && number == 0; at = at->ifa_next) {
+        const struct sockaddr_in *const in = (const struct sockaddr_in *)(const void *)at->ifa_addr;
+        if (in && in->sin_family == AF_INET && in->sin_addr.s_addr == io.own.sin_addr.s_addr)
+            number = if_nametoindex(at->ifa_name);
+    }
+    freeifaddrs(all);
+    return number;
+}
+
+static void open_xdp_way(const bool native)
+{
+    const char *const failed = xdp_open(&io.xdp, own_interface(), io.own.sin_port, native);
+    if (failed)
+        fail(failed);
+}
+
+static void open_xdp(void)
+{
+    open_xdp_way(false);
+}
+
+static void open_xdp_native(void)
+{
+    open_xdp_way(true);
+}
+
+static bool take_xdp(void)
+{
+    return is_reply(xdp_take(&io.xdp));
+}
+
+static bool receive_xdp_wait(const int64_t deadline_ns)
+{
+    return take_xdp() || (wait_for(io.xdp.fd, deadline_ns) && take_xdp());
+}
+
+static bool receive_xdp_spin(const int64_t deadline_ns)
+{
+    bool got;
+    do
+        got = take_xdp();
+    while (!got && now_ns() < deadline_ns);
+    return got;
+}
+
 static const struct way {
     const char *name;
     void (*open)(void);
@@ -181,19 +243,21 @@ static const struct way {
     {"spin", NULL, receive_spin},
     {"packet-wait", open_packet, receive_packet_wait},
     {"packet-spin", open_packet, receive_packet_spin},
+    {"xdp-wait", open_xdp, receive_xdp_wait},
+    {"xdp-spin", open_xdp, receive_xdp_spin},
+    {"xdp-native-wait", open_xdp_native, receive_xdp_wait},
+    {"xdp-native-spin", open_xdp_native, receive_xdp_spin},
 };
 
 /* ---- measurement ------------------------------------------------------------------------------------------------- */
 
 static void connect_to(const struct sockaddr_in *const peer)
 {
-    struct sockaddr_in own = {0};
-    socklen_t size = sizeof own;
+    socklen_t size = sizeof io.own;
     io.fd = socket(AF_INET, SOCK_DGRAM, 0);
     if (io.fd < 0 || connect(io.fd, (const struct sockaddr *)peer, sizeof *peer) != 0 ||
-        getsockname(io.fd, (struct sockaddr *)&own, &size) != 0)
+        getsockname(io.fd, (struct sockaddr *)&io.own, &size) != 0)
         fail("socket");
-    io.port = own.sin_port;
 }
 
 static int measure(const struct way *const way, const size_t request, const int cycles)
@@ -237,7 +301,8 @@ int main(const int argc, char **const argv)
         connect_to(&peer);
         if (ways[i].open)
             ways[i].open();
-        return measure(&ways[i], strtoul(argv[4], NULL, 10), (int)strtol(argv[6], NULL, 10));
+        const int cycles = (int)strtol(argv[6], NULL, 10);
+        return cycles > 0 ? measure(&ways[i], strtoul(argv[4], NULL, 10), cycles) : 0;
     }
     fprintf(stderr, "bench_receive: see the comment at the top of bench_receive.c, or run `make bench`\n");
     return 2;
