@@ -10,14 +10,29 @@
 #include <hm2/flash.h>
 #include <hm2/sim_flash.h>
 
-enum torture_kind { TORTURE_WRITE, TORTURE_WRITE_FALLBACK, TORTURE_RESTORE };
+enum torture_kind {
+    TORTURE_WRITE,
+    TORTURE_WRITE_FALLBACK,
+    TORTURE_RESTORE,
+    TORTURE_VERIFY,       /* of the user image that is there */
+    TORTURE_VERIFY_OTHER, /* of one that is not: HM2_ERR_MISMATCH */
+    TORTURE_BACKUP,
+};
 
-struct torture {
+struct torture_setup {
     enum torture_kind kind;
     const char *profile;
+    size_t late_bytes; /* of the images differ from those that are there, 0 = everything does */
+    size_t bytes;      /* of an image, about; 0 = as real ones */
+    uint8_t flash_id;  /* of the chip; 0 = as delivered */
+};
+
+struct torture {
+    struct torture_setup setup;
     struct sim_card *sim;
     struct sim_net *net;
-    uint8_t *flash, *before, *wanted; /* whole chips */
+    struct link *link;                       /* that the command uses: the net's, or one of the test's above it */
+    uint8_t *flash, *before, *wanted, *dump; /* whole chips */
     size_t size;
     uint8_t *file; /* that is written */
     struct flash_image image;
@@ -27,14 +42,18 @@ struct torture {
     uint64_t operations; /* that an undisturbed run takes */
 };
 
-/* late_bytes of the images differ from those that are there, 0 = everything does. */
-struct torture *torture_new(enum torture_kind kind, const char *profile, size_t late_bytes);
+/* FLASH_TORTURE=N makes N times as many runs; 1 by default. */
+unsigned torture_factor(void);
+
+struct torture *torture_new(const struct torture_setup *setup);
 void torture_free(struct torture *torture);
 
 /* As at the beginning, without faults. */
 void torture_reset(struct torture *torture);
-/* The command, from identification on; its result. */
+/* The command, from identification on; its result, HM2_ERR_MISMATCH when what was read is not what it should be. */
 int torture_run(struct torture *torture);
+/* Whatever is on its way arrives. */
+void torture_settle(struct torture *torture);
 /* Off and on, faults mended. */
 void torture_power_up(struct torture *torture);
 /* Fails the test when the card would not start, or holds anything but images that it had or was to get. */

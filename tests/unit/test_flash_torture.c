@@ -14,24 +14,16 @@
 #define CUTS       70u    /* of each scenario, at least */
 #define LOSSY_RUNS 70u
 
-static unsigned factor(void)
-{
-    const char *const text = getenv("FLASH_TORTURE");
-    const long value = text ? strtol(text, NULL, 10) : 1;
-    return value < 1 ? 1 : value > 1000 ? 1000 : (unsigned)value;
-}
-
 static const struct scenario {
     const char *name;
-    enum torture_kind kind;
-    const char *profile;
+    struct torture_setup setup;
 } scenarios[] = {
-    {"write", TORTURE_WRITE, "7i93"},
-    {"write", TORTURE_WRITE, "7i96s"},
-    {"fallback write", TORTURE_WRITE_FALLBACK, "7i93"},
-    {"fallback write", TORTURE_WRITE_FALLBACK, "7i96s"},
-    {"restore", TORTURE_RESTORE, "7i93"},
-    {"restore", TORTURE_RESTORE, "7i96s"},
+    {"write", {TORTURE_WRITE, "7i93", LATE_BYTES, 0, 0}},
+    {"write", {TORTURE_WRITE, "7i96s", LATE_BYTES, 0, 0}},
+    {"fallback write", {TORTURE_WRITE_FALLBACK, "7i93", LATE_BYTES, 0, 0}},
+    {"fallback write", {TORTURE_WRITE_FALLBACK, "7i96s", LATE_BYTES, 0, 0}},
+    {"restore", {TORTURE_RESTORE, "7i93", LATE_BYTES, 0, 0}},
+    {"restore", {TORTURE_RESTORE, "7i96s", LATE_BYTES, 0, 0}},
 };
 
 /* The same command again, on a card that is well. */
@@ -40,14 +32,14 @@ static void second_run(struct torture *const t, const char *const what, const ui
     torture_power_up(t);
     torture_check_starts(t, what, number);
     if (torture_run(t) != 0)
-        fail_msg("%s, %s %" PRIu64 ", second run: %s", t->profile, what, number, t->diag.text);
+        fail_msg("%s, %s %" PRIu64 ", second run: %s", t->setup.profile, what, number, t->diag.text);
     torture_check_wanted(t, what, number);
 }
 
 static void cut_all(const struct scenario *const scenario)
 {
-    struct torture *const t = torture_new(scenario->kind, scenario->profile, LATE_BYTES);
-    const uint64_t cuts_wanted = (uint64_t)CUTS * factor();
+    struct torture *const t = torture_new(&scenario->setup);
+    const uint64_t cuts_wanted = (uint64_t)CUTS * torture_factor();
     const uint64_t step = t->operations <= cuts_wanted ? 1 : t->operations / cuts_wanted;
     uint64_t cuts = 0;
     for (uint64_t at = 1; at <= t->operations; at += at < 8 ? 1 : step, cuts++) {
@@ -55,11 +47,11 @@ static void cut_all(const struct scenario *const scenario)
         const struct sim_flash_faults faults = {.cut_at = at, .cut_bytes = (unsigned)(at * 37 % 257), .seed = at};
         sim_card_flash_faults(t->sim, &faults);
         if (torture_run(t) == 0)
-            fail_msg("%s, %s: cut %" PRIu64 " went unnoticed", t->profile, scenario->name, at);
+            fail_msg("%s, %s: cut %" PRIu64 " went unnoticed", t->setup.profile, scenario->name, at);
         second_run(t, scenario->name, at);
     }
-    printf("%s, %s: %" PRIu64 " power cuts in %" PRIu64 " operations, seed = operation\n", t->profile, scenario->name,
-           cuts, t->operations);
+    printf("%s, %s: %" PRIu64 " power cuts in %" PRIu64 " operations, seed = operation\n", t->setup.profile,
+           scenario->name, cuts, t->operations);
     torture_free(t);
 }
 
@@ -72,8 +64,8 @@ static void the_power_may_go_at_any_moment(void **state)
 
 static void lose(const struct scenario *const scenario)
 {
-    struct torture *const t = torture_new(scenario->kind, scenario->profile, LATE_BYTES);
-    const unsigned runs = LOSSY_RUNS * factor();
+    struct torture *const t = torture_new(&scenario->setup);
+    const unsigned runs = LOSSY_RUNS * torture_factor();
     unsigned failed = 0;
     for (unsigned seed = 1; seed <= runs; seed++) {
         torture_reset(t);
@@ -92,7 +84,7 @@ static void lose(const struct scenario *const scenario)
             second_run(t, scenario->name, seed);
         failed += err != 0;
     }
-    printf("%s, %s: %u lossy runs, seeds 1 to %u; %u of them did not come to the end at once\n", t->profile,
+    printf("%s, %s: %u lossy runs, seeds 1 to %u; %u of them did not come to the end at once\n", t->setup.profile,
            scenario->name, runs, runs, failed);
     torture_free(t);
 }
@@ -107,7 +99,7 @@ static void the_network_may_be_bad(void **state)
 static void bits_that_fail_now_and_then_are_written_again(void **state)
 {
     (void)state;
-    struct torture *const t = torture_new(TORTURE_WRITE, "7i93", LATE_BYTES);
+    struct torture *const t = torture_new(&scenarios[0].setup);
     for (unsigned i = 0; i < 8; i++) {
         torture_reset(t);
         const uint32_t at = (uint32_t)t->size / 2 + (uint32_t)t->image.payload_bytes - 500 * i - 50;
@@ -123,7 +115,7 @@ static void bits_that_fail_now_and_then_are_written_again(void **state)
 static void bits_that_always_fail_end_the_run_and_the_fallback_starts(void **state)
 {
     (void)state;
-    struct torture *const t = torture_new(TORTURE_WRITE, "7i96s", LATE_BYTES);
+    struct torture *const t = torture_new(&scenarios[1].setup);
     torture_reset(t);
     uint32_t at = (uint32_t)t->size / 2 + (uint32_t)t->image.payload_bytes - 2000;
     while (t->wanted[at] == 0xFF || t->before[at] == t->wanted[at])
@@ -139,7 +131,7 @@ static void bits_that_always_fail_end_the_run_and_the_fallback_starts(void **sta
 static void a_chip_that_never_ends_is_reported_in_time(void **state)
 {
     (void)state;
-    struct torture *const t = torture_new(TORTURE_WRITE, "7i93", LATE_BYTES);
+    struct torture *const t = torture_new(&scenarios[0].setup);
     torture_reset(t);
     const struct sim_flash_faults faults = {.stuck_at = 3};
     sim_card_flash_faults(t->sim, &faults);
