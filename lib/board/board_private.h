@@ -102,6 +102,7 @@ enum board_event_kind {
     BOARD_EVENT_PIPELINE_RUNS,    /* words: enum board_pipeline_word */
     BOARD_EVENT_PIPELINE_FALLS,   /* the same: too many replies were late */
     BOARD_EVENT_PIPELINE_NO_ROOM, /* the same: a period is too short for it */
+    BOARD_EVENT_PIPELINE_NO_TIME, /* the same: the card's timer fires before transfers are over */
     BOARD_EVENTS
 };
 
@@ -127,6 +128,9 @@ enum board_pipeline_word {
     BOARD_PIPELINE_RTT_US,
     BOARD_PIPELINE_PERIOD_US,
     BOARD_PIPELINE_LATE,
+    BOARD_PIPELINE_EARLY,
+    BOARD_PIPELINE_TIMER_US,
+    BOARD_PIPELINE_NEED_US,
 };
 
 /* Words of HM2_NOTICE_WATCHDOG_BIT, which the board adds. */

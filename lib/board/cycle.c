@@ -265,6 +265,8 @@ static void unpack_all(struct hm2_board *const board)
     else if (hm2_watchdog_bites(board->watchdog))
         cycle->undriven = undriven_since_bite(board, cycle->now_ns);
     call_all(&board->unpacks, cycle);
+    if (board->pipeline.turned)
+        board_pipeline_unpacked(board);
     board->unpacked_ns = cycle->now_ns;
     board->petted = false;
     *board->points->data_age = 0;

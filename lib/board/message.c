@@ -173,11 +173,20 @@ static void say_pipeline(const struct text *const text, const char *const what, 
 {
     SAY(text,
         "%s: %s. Of a period of %u us the thread needs up to %u us until it writes, the card waits up to %u us, "
-        "packets "
-        "are on their way for %u us; %u replies were late so far",
+        "packets are on their way for %u us; so far %u replies were late, %u were read before smart-serial transfers "
+        "were over",
         text->board->prefix, what, (unsigned)words[BOARD_PIPELINE_PERIOD_US], (unsigned)words[BOARD_PIPELINE_WORK_US],
         (unsigned)words[BOARD_PIPELINE_WAIT_US], (unsigned)words[BOARD_PIPELINE_RTT_US],
-        (unsigned)words[BOARD_PIPELINE_LATE]);
+        (unsigned)words[BOARD_PIPELINE_LATE], (unsigned)words[BOARD_PIPELINE_EARLY]);
+}
+
+static void say_no_time(const struct text *const text, const uint32_t *const words)
+{
+    SAY(text,
+        "%s: plain cycles: smart-serial transfers may take %u us, but the DPLL's timer fires %u us behind the write; "
+        "set dpll.%02u.timer-us to more",
+        text->board->prefix, (unsigned)words[BOARD_PIPELINE_NEED_US], (unsigned)words[BOARD_PIPELINE_TIMER_US],
+        text->board->pipeline.timer);
 }
 
 static bool say_event(const struct text *const text, const struct board_event *const event)
@@ -209,7 +218,10 @@ static bool say_event(const struct text *const text, const struct board_event *c
         say_pipeline(text, "the cycle is pipelined now", event->words);
         return false;
     case BOARD_EVENT_PIPELINE_FALLS:
-        say_pipeline(text, "too many replies came late: plain cycles again, the pipelined one is tried again later",
+        say_pipeline(text,
+                     "too many replies came late, or before transfers were over: plain cycles again, the pipelined one "
+                     "is tried again "
+                     "later",
                      event->words);
         return false;
     case BOARD_EVENT_PIPELINE_NO_ROOM:
@@ -218,6 +230,9 @@ static bool say_event(const struct text *const text, const struct board_event *c
             "plain cycles: the pipelined one has no room, or the DPLL timer's offset is not between 1 us and a "
             "third of the period",
             event->words);
+        return false;
+    case BOARD_EVENT_PIPELINE_NO_TIME:
+        say_no_time(text, event->words);
         return false;
     case BOARD_EVENTS:
         break;

@@ -9,12 +9,13 @@
 #define LATE_LEVEL  16u
 #define LEVEL_LIMIT 64u
 
-#define RTT_KNOWN       256u /* replies */
-#define RTT_ABOVE       8u   /* of 1024 may take longer than the bound */
-#define DPLL_STARTS     110u /* writes, in the first hundred of which the loop is held */
-#define LOOK_EVERY      16u  /* cycles */
-#define GUARD_PER_MILLE 50   /* of the period */
-#define WORK_FORGETS    64   /* peaks lose this part of themselves in a cycle */
+#define RTT_KNOWN       256u           /* replies */
+#define RTT_ABOVE       8u             /* of 1024 may take longer than the bound */
+#define DPLL_STARTS     110u           /* writes, in the first hundred of which the loop is held */
+#define LOOK_EVERY      16u            /* cycles */
+#define GUARD_PER_MILLE 50             /* of the period */
+#define WORK_FORGETS    64             /* peaks lose this part of themselves in a cycle */
+#define JITTER_NS       INT64_C(40000) /* a turn may be so late and finds transfers finished */
 
 #define FIRST_PAUSE_NS   INT64_C(1000000000)
 #define LONGEST_PAUSE_NS INT64_C(64000000000)
@@ -23,6 +24,11 @@
 static uint32_t us_of(const int64_t ns)
 {
     return ns < 0 ? 0 : ns / 1000 > UINT32_MAX ? UINT32_MAX : (uint32_t)(ns / 1000);
+}
+
+static int64_t timer_ns(struct hm2_board *const board)
+{
+    return hm2_dpll_timer_ns(hm2_board_module(board, HM2_GTAG_DPLL), board->pipeline.timer);
 }
 
 HM2_RARE static void tell(struct hm2_board *const board, const enum board_event_kind kind)
@@ -35,6 +41,9 @@ HM2_RARE static void tell(struct hm2_board *const board, const enum board_event_
                                           [BOARD_PIPELINE_RTT_US] = us_of(p->rtt_ns),
                                           [BOARD_PIPELINE_PERIOD_US] = us_of(board->period_ns),
                                           [BOARD_PIPELINE_LATE] = *p->points->late,
+                                          [BOARD_PIPELINE_EARLY] = *p->points->early,
+                                          [BOARD_PIPELINE_TIMER_US] = us_of(timer_ns(board)),
+                                          [BOARD_PIPELINE_NEED_US] = us_of(p->need_ns),
                                       }});
 }
 
@@ -63,13 +72,13 @@ HM2_RARE static void fall_back(struct hm2_board *const board, const int64_t now_
 static int64_t compute_room_ns(struct hm2_board *const board)
 {
     struct board_pipeline *const p = &board->pipeline;
-    const int64_t timer_ns = hm2_dpll_timer_ns(hm2_board_module(board, HM2_GTAG_DPLL), p->timer);
+    const int64_t wait_ns = timer_ns(board);
     /* Arrivals jitter around the loop's reference by half of the timer's offset before the card stops waiting. */
-    p->timeout_ns = timer_ns + timer_ns / 2;
+    p->timeout_ns = wait_ns + wait_ns / 2;
     p->rtt_ns = board_rtt_bound_ns(&board->rtt, RTT_ABOVE);
     const int64_t room_ns = board->period_ns - p->work_ns - p->timeout_ns - p->rtt_ns;
     *p->points->margin_us = (double)room_ns * 1e-3;
-    const bool possible = timer_ns >= 1000 && p->timeout_ns <= board->period_ns / 2 && p->timeout_ns <= 65535000;
+    const bool possible = wait_ns >= 1000 && p->timeout_ns <= board->period_ns / 2 && p->timeout_ns <= 65535000;
     return possible ? room_ns - board->period_ns / 1000 * GUARD_PER_MILLE : -1;
 }
 
@@ -81,10 +90,10 @@ static bool may_run(struct hm2_board *const board, const int64_t now_ns)
     if (board->cycles - p->looked < LOOK_EVERY)
         return false;
     p->looked = board->cycles;
-    if (compute_room_ns(board) >= 0)
-        return true;
-    tell(board, BOARD_EVENT_PIPELINE_NO_ROOM);
-    return false;
+    const bool room = compute_room_ns(board) >= 0, time = timer_ns(board) >= p->need_ns;
+    if (!room || !time)
+        tell(board, room ? BOARD_EVENT_PIPELINE_NO_TIME : BOARD_EVENT_PIPELINE_NO_ROOM);
+    return room && time;
 }
 
 HM2_RARE static void begin(struct hm2_board *const board, const int64_t now_ns)
@@ -132,6 +141,30 @@ int64_t board_pipeline_sample_ns(const struct hm2_board *const board)
     return board->request_ns + hm2_plan_facts(board->plan).waited_us * INT64_C(1000);
 }
 
+void board_pipeline_setup(struct hm2_board *const board)
+{
+    struct board_pipeline *const p = &board->pipeline;
+    for (unsigned i = 0; i < board->module_count; i++) {
+        const struct hm2_module *const module = &board->modules[i];
+        const int64_t ns = module->type->turn_ns ? module->type->turn_ns(module) : 0;
+        p->need_ns = ns > p->need_ns ? ns : p->need_ns;
+    }
+    if (p->need_ns > 0)
+        hm2_dpll_offer_timer_ns(hm2_board_module(board, HM2_GTAG_DPLL), p->timer, p->need_ns + JITTER_NS);
+}
+
+void board_pipeline_unpacked(struct hm2_board *const board)
+{
+    bool unfinished = false;
+    for (unsigned i = 0; i < board->module_count; i++)
+        if (board->modules[i].type->unfinished)
+            unfinished |= board->modules[i].type->unfinished(&board->modules[i]);
+    if (!unfinished)
+        return;
+    board->pipeline.level += LATE_LEVEL;
+    *board->pipeline.points->early = *board->pipeline.points->early + 1u;
+}
+
 void board_pipeline_lost(struct hm2_board *const board)
 {
     board->pipeline.level += LATE_LEVEL;
@@ -140,6 +173,8 @@ void board_pipeline_lost(struct hm2_board *const board)
 void board_pipeline_received(struct hm2_board *const board, const bool on_time)
 {
     struct board_pipeline *const p = &board->pipeline;
+    board->cycle.turned = p->turned;
+    board->cycle.before_kept = hm2_plan_facts(board->plan).before_kept;
     if (!p->turned) {
         *p->points->data_age_us = (double)(board->received_ns - board->request_ns) * 1e-3;
         return;

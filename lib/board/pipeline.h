@@ -16,7 +16,7 @@ struct hm2_board;
 struct board_pipeline_points {
     hm2_bit_t *active;
     hm2_float_t *margin_us, *data_age_us;
-    hm2_u32_t *wait_us, *late, *falls;
+    hm2_u32_t *wait_us, *late, *early, *falls;
 };
 
 struct board_pipeline {
@@ -25,6 +25,7 @@ struct board_pipeline {
     bool turned;            /* the last request was a turn */
     unsigned level;         /* rises with late and lost replies, falls with good ones */
     int64_t work_ns;        /* from the beginning of read to the write, with its peaks */
+    int64_t need_ns;        /* between a write and the reads, for what writes start */
     int64_t timeout_ns;     /* how long the card waits at most */
     int64_t rtt_ns;         /* that nearly all replies need without waiting */
     int64_t started_ns;     /* when it was switched on */
@@ -40,6 +41,10 @@ bool board_pipeline_turns(struct hm2_board *board, int64_t now_ns);
 uint16_t board_pipeline_timeout_us(const struct hm2_board *board);
 /* Plain cycles from now on, until there is room again. */
 void board_pipeline_stop(struct hm2_board *board);
+/* Once, when all modules are set up: the time they need becomes the timer's, unless it is longer. */
+void board_pipeline_setup(struct hm2_board *board);
+/* The same: the modules have unpacked the reply to a turn. */
+void board_pipeline_unpacked(struct hm2_board *board);
 /* The same: a good reply; when it answers a turn: was it there when read began? */
 void board_pipeline_received(struct hm2_board *board, bool on_time);
 /* The reply to a turn did not come. */

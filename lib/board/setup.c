@@ -299,19 +299,6 @@ static void prepare_cycle(struct hm2_board *const board)
     }
 }
 
-/* A transfer that the write starts is not over when the card has waited, and read too early it is a fault of the port.
- */
-static bool has_remotes(const struct hm2_board *const board)
-{
-    for (unsigned i = 0; i < board->module_count; i++) {
-        const struct hm2_module *const module = &board->modules[i];
-        const uint8_t gtag = module->type->gtag;
-        if ((gtag == HM2_GTAG_SSERIAL || gtag == HM2_GTAG_SSERIALB) && module->context)
-            return true;
-    }
-    return false;
-}
-
 static void warn_plain(const struct hm2_board *const board, const char *const reason, struct hm2_diag *const diag)
 {
     hm2_diag_warn(diag, "%s: config pipelined=%u has no effect: %s", board->prefix, board->config.pipelined, reason);
@@ -322,13 +309,7 @@ static int lay_out(struct hm2_board *const board, struct hm2_diag *const diag)
     const unsigned timer = board->config.pipelined;
     if (timer == 0)
         return hm2_plan_freeze(board->plan, diag);
-    if (has_remotes(board)) {
-        warn_plain(board,
-                   "smart-serial remotes need more time than the card waits (sserial_port_0=xxxxxxxx leaves them "
-                   "alone)",
-                   diag);
-        return hm2_plan_freeze(board->plan, diag);
-    }
+    board_pipeline_setup(board);
     int err = hm2_plan_pipeline(board->plan, timer, diag);
     if (err == 0)
         err = hm2_plan_freeze(board->plan, diag);

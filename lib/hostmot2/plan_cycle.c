@@ -193,6 +193,7 @@ HM2_RARE static void resend_undone(struct hm2_plan *const plan, const uint32_t f
 static void take_extra(struct hm2_plan *const plan, const uint8_t extra[const PLAN_EXTRA_BYTES])
 {
     const uint32_t found = hm2_get_le32(extra + PLAN_EXTRA_BEFORE);
+    plan->facts.before_kept = found == plan->write_before;
     if (hm2_delta32(plan->section_write_seq, found) > 0)
         resend_undone(plan, found);
     plan->facts.waited_us = hm2_get_le16(extra + PLAN_EXTRA_WAITED);
@@ -232,9 +233,12 @@ enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
         plan->late_request = age < 64 && number > plan->requests_before ? number : 0;
         return HM2_REPLY_LATE;
     }
-    plan->facts.waited_us = 0;
-    if (is_turn)
+    if (is_turn) {
         take_extra(plan, extra);
+    } else {
+        plan->facts.waited_us = 0;
+        plan->facts.before_kept = false;
+    }
     accept(plan);
     return HM2_REPLY_FRESH;
 }

@@ -94,6 +94,7 @@ struct hm2_plan {
     bool repeatable;                   /* no read has to happen exactly once */
 
     uint32_t write_seq, section_write_seq; /* last write, last one with sections */
+    uint32_t write_before;                 /* the write before the last turn */
     size_t fixed_len;
     uint32_t session, session_write_seq;
     enum plan_state session_state;

@@ -205,6 +205,13 @@ int64_t hm2_dpll_timer_ns(const struct hm2_module *const module, const unsigned 
     return isfinite(offset_us) && fabs(offset_us) < 1e9 ? (int64_t)(offset_us * 1e3) : 0;
 }
 
+void hm2_dpll_offer_timer_ns(const struct hm2_module *const module, const unsigned timer, const int64_t ns)
+{
+    const struct dpll *const ctx = module ? module->context : NULL;
+    if (ctx && hm2_dpll_timer_ns(module, timer) < ns)
+        *ctx->timer[timer - 1].offset_us = (double)ns * 1e-3;
+}
+
 void hm2_dpll_align(struct hm2_module *const module)
 {
     if (module && module->context)

@@ -83,6 +83,7 @@ struct sserial_port {
     uint8_t first, channels; /* channels first .. first + channels - 1 are transferred */
     unsigned user_words;     /* interface registers read, and ... */
     unsigned write_words;    /* written */
+    int64_t doit_ns;         /* that a DOIT takes, with a reserve */
     struct hm2_window command, data, cs, user[SSLBP_USER_WORDS];
     struct hm2_window command_out, cs_out, user_out[SSLBP_USER_WORDS];
     struct sslbp_engine engine;
@@ -141,5 +142,7 @@ void sserial_restart(struct hm2_module *module, const struct hm2_cycle *cycle);
 void sserial_unpack_all(struct hm2_module *module, const struct hm2_cycle *cycle);
 void sserial_pack_all(struct hm2_module *module, const struct hm2_cycle *cycle);
 void sserial_write_lost(struct hm2_module *module);
+int64_t sserial_turn_ns(const struct hm2_module *module);
+bool sserial_unfinished(const struct hm2_module *module);
 
 #endif

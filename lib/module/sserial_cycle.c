@@ -64,7 +64,8 @@ static void show_remotes(const struct hm2_module *const module, const struct sse
     for (const struct sserial_remote *remote = port->remotes, *const end = remote + port->remote_count; remote < end;
          remote++) {
         const struct sslbp_channel *const channel = &port->engine.channel[remote->channel];
-        *remote->fault = channel->failing || !(fresh >> remote->channel & 1u);
+        if (!port->engine.unfinished)
+            *remote->fault = channel->failing || !(fresh >> remote->channel & 1u);
         *remote->errors = channel->errors;
         *remote->status = channel->cs;
         fault |= channel->lost;
@@ -88,6 +89,8 @@ static void unpack_port(const struct hm2_module *const module, struct sserial_po
         .cs = cs,
         .user = (const uint32_t(*)[3])user,
         .write_lost = port->write_lost,
+        .early = cycle->turned,
+        .in_order = cycle->before_kept,
         .now_ns = cycle->now_ns,
     };
     const struct sslbp_wish wish = wish_of(port, cycle);
@@ -97,7 +100,7 @@ static void unpack_port(const struct hm2_module *const module, struct sserial_po
     take_inputs(port, fresh);
     for (unsigned i = 0; started && i < port->remote_count; i++)
         sserial_start_counters(&port->remotes[i]);
-    if (port->engine.step == SSLBP_STEP_RUN && !port->engine.clear)
+    if (port->engine.step == SSLBP_STEP_RUN && !port->engine.clear && !port->engine.unfinished)
         hm2_notice(module, HM2_NOTICE_PORT_LATE, port->number, (double)(cycle->now_ns - port->engine.sent_ns) * 1e-3);
     show_remotes(module, port, fresh);
 }
@@ -107,6 +110,24 @@ void sserial_unpack_all(struct hm2_module *const module, const struct hm2_cycle 
     const struct sserial *const ctx = module->context;
     for (unsigned i = 0; i < ctx->port_count; i++)
         unpack_port(module, &ctx->ports[i], cycle);
+}
+
+int64_t sserial_turn_ns(const struct hm2_module *const module)
+{
+    const struct sserial *const ctx = module->context;
+    int64_t longest = 0;
+    for (unsigned i = 0; ctx && i < ctx->port_count; i++)
+        longest = ctx->ports[i].doit_ns > longest ? ctx->ports[i].doit_ns : longest;
+    return longest;
+}
+
+bool sserial_unfinished(const struct hm2_module *const module)
+{
+    const struct sserial *const ctx = module->context;
+    for (unsigned i = 0; ctx && i < ctx->port_count; i++)
+        if (ctx->ports[i].engine.unfinished)
+            return true;
+    return false;
 }
 
 void sserial_write_lost(struct hm2_module *const module)

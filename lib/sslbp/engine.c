@@ -257,12 +257,16 @@ static void check_time(struct sslbp_engine *const engine, const int64_t now_ns)
     fail(engine, now_ns);
 }
 
-/* Did the card carry out the write with our last command? It says so of the last write only: when a reply was lost in
- * between, a clear register may mean that the command never arrived. */
+/* Did the card carry out the write with our last command, and nothing behind it? A plain reply says so of the last
+ * write only: when a reply was lost in between, a clear register may mean that the command never arrived. An early one
+ * tells of the write before too. When an older write has come in front of our last one, it may have begun a transfer,
+ * during which the port takes no command: what the registers show is then the end of that one. */
 static bool is_certain(const struct sslbp_engine *const engine, const struct sslbp_reply *const reply)
 {
     if (engine->age == SSLBP_AGE_LAST)
-        return !reply->write_lost;
+        return !reply->write_lost && (!reply->early || reply->in_order);
+    if (engine->age == SSLBP_AGE_SECOND && reply->in_order)
+        return true;
     return engine->age == SSLBP_AGE_KNOWN || !engine->clear;
 }
 
@@ -281,13 +285,15 @@ unsigned sslbp_engine_take(struct sslbp_engine *const engine, const struct sslbp
     for (unsigned i = 0, end = channel_end(engine); i < end; i++)
         engine->channel[i].event = SSLBP_EVENT_NONE;
     const bool certain = is_certain(engine, reply);
+    engine->unfinished =
+        reply->early && engine->age == SSLBP_AGE_LAST && engine->step == SSLBP_STEP_RUN && !engine->clear;
     engine->age = SSLBP_AGE_KNOWN;
     if (!certain)
         take_uncertain(engine, reply);
     else if (engine->step == SSLBP_STEP_RUN && engine->clear)
         return take_doit(engine, reply, wish);
     else if (engine->step == SSLBP_STEP_RUN)
-        fill(&engine->bucket, wish->fault_inc); /* the cycle is too short, or the port hangs */
+        fill(&engine->bucket, engine->unfinished ? 0 : wish->fault_inc); /* the cycle is too short, or the port hangs */
     else if (engine->sent && engine->step == SSLBP_STEP_RESET)
         enter(engine, SSLBP_STEP_RELEASE, reply->now_ns);
     else if (engine->sent && engine->clear)
@@ -484,9 +490,10 @@ struct sslbp_orders sslbp_engine_next(struct sslbp_engine *const engine, const s
             order_command(engine, wish->now_ns, &orders);
     }
     engine->fresh = false;
-    engine->age = !(orders.command & SSLBP_IGNORE) ? SSLBP_AGE_LAST
-                  : engine->age < SSLBP_AGE_KNOWN  ? SSLBP_AGE_UNKNOWN
-                                                   : engine->age;
+    engine->age = !(orders.command & SSLBP_IGNORE)  ? SSLBP_AGE_LAST
+                  : engine->age == SSLBP_AGE_LAST   ? SSLBP_AGE_SECOND
+                  : engine->age == SSLBP_AGE_SECOND ? SSLBP_AGE_UNKNOWN
+                                                    : engine->age;
     return orders;
 }
 

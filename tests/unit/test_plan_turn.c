@@ -123,6 +123,25 @@ static void what_is_not_the_reply_is_told_apart(void **state)
     assert_int_equal(hm2_window_get(&f->counts, 0), 4);
 }
 
+static void a_reply_tells_whether_the_write_before_it_was_the_last_one(void **state)
+{
+    struct fixture *const f = *state;
+    size_t len;
+    freeze(f);
+    turn(f);
+    turn(f);
+    assert_int_equal(answer(f, 2, 1, 2, 0), HM2_REPLY_FRESH);
+    assert_true(hm2_plan_facts(f->plan).before_kept);
+    turn(f);
+    turn(f);
+    assert_int_equal(answer(f, 4, 2, 4, 0), HM2_REPLY_FRESH); /* the third was lost */
+    assert_false(hm2_plan_facts(f->plan).before_kept);
+    (void)hm2_plan_write(f->plan, &len);
+    turn(f);
+    assert_int_equal(answer(f, 5, 5, 6, 0), HM2_REPLY_FRESH); /* a plain write counts as well */
+    assert_true(hm2_plan_facts(f->plan).before_kept);
+}
+
 static void sections_of_a_lost_turn_are_sent_again(void **state)
 {
     struct fixture *const f = *state;
@@ -214,6 +233,7 @@ int main(void)
         TEST(a_turn_is_laid_out_byte_for_byte),
         TEST(its_reply_confirms_the_write_and_reaches_the_windows),
         TEST(what_is_not_the_reply_is_told_apart),
+        TEST(a_reply_tells_whether_the_write_before_it_was_the_last_one),
         TEST(sections_of_a_lost_turn_are_sent_again),
         TEST(an_older_turn_that_arrives_between_two_newer_ones_is_noticed),
         TEST(plain_requests_and_turns_follow_each_other),

@@ -628,25 +628,11 @@ static void many_cycles_with_errors_on_both_lines_show_nothing_stale_and_drive_n
     assert_int_equal(servo_get(f, "sserial.port-0.port_state"), SSLBP_RUNNING);
 }
 
-/* A read that comes too early would be a fault of the port. */
-static void a_card_with_remotes_keeps_plain_cycles(void **state)
-{
-    struct servo_rig *const f = *state;
-    plug(f);
-    servo_load(f, "pipelined=4");
-    assert_non_null(strstr(f->diag.text, "pipelined=4 has no effect: smart-serial remotes"));
-    servo_cycles(f, 1000);
-    assert_true(servo_get(f, "pipeline.active") == 0);
-    assert_true(servo_get(f, "sserial.port-0.fault-count") == 0);
-    assert_true(servo_get(f, "packet-error-total") == 0);
-}
-
 int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, servo_tear_down)
     const struct CMUnitTest tests[] = {
         TEST(discovery_makes_the_points_of_both_processors),
-        TEST(a_card_with_remotes_keeps_plain_cycles),
         TEST(a_mode_decides_which_points_there_are),
         TEST(a_remote_that_is_missing_in_its_mode_is_an_error_with_what_was_seen),
         TEST(an_empty_channel_of_mode_0_is_a_warning_and_its_pins_are_gpio),

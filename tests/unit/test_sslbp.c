@@ -503,6 +503,7 @@ struct bench {
     struct sslbp_wish wish;
     uint32_t command, data, cs[8], user[8][3]; /* what the next reply shows */
     bool write_lost;
+    bool early, out_of_order; /* replies to turns; an older write has come before the last */
     struct sslbp_orders orders;
 };
 
@@ -523,9 +524,15 @@ static struct bench new_bench(const unsigned mask)
 
 static unsigned take(struct bench *const b)
 {
-    const struct sslbp_reply reply = {b->command,    b->data,       b->cs, (const uint32_t(*)[3])b->user,
-                                      b->write_lost, b->wish.now_ns};
-    b->write_lost = false;
+    const struct sslbp_reply reply = {.command = b->command,
+                                      .data = b->data,
+                                      .cs = b->cs,
+                                      .user = (const uint32_t(*)[3])b->user,
+                                      .write_lost = b->write_lost,
+                                      .early = b->early,
+                                      .in_order = b->early && !b->out_of_order,
+                                      .now_ns = b->wish.now_ns};
+    b->write_lost = b->out_of_order = false;
     return sslbp_engine_take(&b->engine, &reply, &b->wish);
 }
 
@@ -610,6 +617,95 @@ static void a_lost_write_brings_no_inputs(void **state)
     assert_int_equal(take(&b), 0);
     assert_int_equal(next(&b), 0x1001);
     assert_int_equal(take(&b), 1);
+}
+
+static void a_doit_that_is_under_way_in_its_own_packet_is_no_failure_and_is_awaited(void **state)
+{
+    (void)state;
+    struct bench b = new_bench(1);
+    b.early = true;
+    start(&b);
+    for (unsigned i = 0; i < 50; i++) {
+        b.command = 0x1001;
+        assert_int_equal(take(&b), 0);
+        assert_true(b.engine.unfinished);
+        assert_true(next(&b) & SSLBP_IGNORE);
+        b.command = 0;
+        assert_int_equal(take(&b), 1);
+        assert_false(b.engine.unfinished);
+        assert_int_equal(next(&b), 0x1001);
+    }
+    assert_int_equal(sslbp_engine_faults(&b.engine), 0);
+    assert_int_equal(sslbp_engine_state(&b.engine), SSLBP_RUNNING);
+}
+
+static void a_doit_that_outlasts_the_packet_after_its_own_is_a_failure(void **state)
+{
+    (void)state;
+    struct bench b = new_bench(1);
+    b.early = true;
+    start(&b);
+    b.command = 0x1001;
+    assert_int_equal(take(&b), 0);
+    assert_int_equal(sslbp_engine_faults(&b.engine), 0);
+    for (unsigned i = 0; i < 30; i++) {
+        assert_true(next(&b) & SSLBP_IGNORE);
+        assert_int_equal(take(&b), 0);
+        assert_false(b.engine.unfinished);
+    }
+    (void)next(&b);
+    assert_int_equal(sslbp_engine_state(&b.engine), SSLBP_ERROR);
+}
+
+static void after_a_lost_reply_the_next_turn_tells_whether_the_doit_arrived(void **state)
+{
+    (void)state;
+    struct bench b = new_bench(1);
+    b.early = true;
+    start(&b);
+    assert_true(next(&b) & SSLBP_IGNORE);
+    assert_int_equal(take(&b), 1); /* it did: its inputs are used */
+    assert_int_equal(next(&b), 0x1001);
+    assert_true(next(&b) & SSLBP_IGNORE);
+    b.out_of_order = true;
+    assert_int_equal(take(&b), 0); /* it did not: the registers hold what the one before brought */
+    assert_int_equal(next(&b), 0x1001);
+    assert_true(next(&b) & SSLBP_IGNORE);
+    assert_true(next(&b) & SSLBP_IGNORE);
+    assert_int_equal(take(&b), 0); /* two are lost: nobody knows */
+    assert_int_equal(next(&b), 0x1001);
+    assert_int_equal(take(&b), 1);
+}
+
+static void a_start_of_a_turn_that_never_arrived_begins_with_a_stop_again(void **state)
+{
+    (void)state;
+    struct bench b = new_bench(1);
+    b.early = true;
+    assert_int_equal(step(&b), 0x0800);
+    assert_int_equal(step(&b), 0x0901);
+    assert_true(next(&b) & SSLBP_IGNORE);
+    b.out_of_order = true;
+    assert_int_equal(step(&b), 0x0800);
+    assert_int_equal(step(&b), 0x0901);
+    assert_true(next(&b) & SSLBP_IGNORE);
+    assert_int_equal(step(&b), 0x1001); /* this one did */
+}
+
+/* The older packet's DOIT may have been under way, and ours was lost. */
+static void behind_an_older_packet_that_comes_late_a_clear_register_proves_nothing(void **state)
+{
+    (void)state;
+    struct bench b = new_bench(1);
+    b.early = true;
+    start(&b);
+    assert_int_equal(take(&b), 1);
+    assert_int_equal(next(&b), 0x1001);
+    b.out_of_order = true;
+    assert_int_equal(take(&b), 0);
+    assert_int_equal(next(&b), 0x1001);
+    assert_int_equal(take(&b), 1);
+    assert_int_equal(sslbp_engine_faults(&b.engine), 0);
 }
 
 static void a_lost_start_begins_with_a_stop_again(void **state)
@@ -806,6 +902,11 @@ int main(void)
         cmocka_unit_test(a_doit_that_must_not_happen_has_the_ignore_bit_and_is_counted),
         cmocka_unit_test(without_a_reply_nothing_is_ordered_and_the_inputs_of_a_doubtful_doit_are_not_used),
         cmocka_unit_test(a_lost_write_brings_no_inputs),
+        cmocka_unit_test(a_doit_that_is_under_way_in_its_own_packet_is_no_failure_and_is_awaited),
+        cmocka_unit_test(a_doit_that_outlasts_the_packet_after_its_own_is_a_failure),
+        cmocka_unit_test(after_a_lost_reply_the_next_turn_tells_whether_the_doit_arrived),
+        cmocka_unit_test(a_start_of_a_turn_that_never_arrived_begins_with_a_stop_again),
+        cmocka_unit_test(behind_an_older_packet_that_comes_late_a_clear_register_proves_nothing),
         cmocka_unit_test(a_lost_start_begins_with_a_stop_again),
         cmocka_unit_test(a_channel_that_fails_is_stopped_alone_after_23_failures),
         cmocka_unit_test(the_last_channel_that_fails_stops_the_port_until_run_changes),

@@ -28,10 +28,12 @@ struct hm2_cycle {
     int64_t received_ns; /* unpack: when the reply was here */
     int64_t period_ns;   /* of the thread, > 0 */
     double period_s;
-    double age_s;    /* unpack: what the inputs are older than this cycle; 0 unless pipelined */
-    uint32_t writes; /* write cycles since load or since the last restart; 0 = this is the first */
-    bool bitten;     /* the card's watchdog has bitten and was not yet cleared: outputs are off */
-    double undriven; /* unpack: part (0..1) of the time since the last one in which outputs were off after a bite */
+    double age_s;     /* unpack: what the inputs are older than this cycle; 0 unless pipelined */
+    bool turned;      /* unpack: the reply answers a turn (hm2_plan_turn()): it was read soon after our last write */
+    bool before_kept; /* then: as in struct hm2_plan_facts */
+    uint32_t writes;  /* write cycles since load or since the last restart; 0 = this is the first */
+    bool bitten;      /* the card's watchdog has bitten and was not yet cleared: outputs are off */
+    double undriven;  /* unpack: part (0..1) of the time since the last one in which outputs were off after a bite */
 };
 
 /* Conditions a module meets in a cycle that a person should hear about. The board turns them into messages outside
@@ -111,6 +113,10 @@ struct hm2_module_type {
     /* A reply to the request of this number (hm2_plan_requests()) has come after it was given up, now; while this runs,
      * the windows show it. For FIFOs, whose words come only once: anything else in it is out of date. May be NULL. */
     void (*late)(struct hm2_module *module, uint64_t request, int64_t now_ns);
+    /* For pipelined cycles: how long after a write what it has started can be read, and whether the last reply to a
+     * turn came too early for it all the same. Both NULL = a write starts nothing that takes time. Realtime safe. */
+    int64_t (*turn_ns)(const struct hm2_module *module);
+    bool (*unfinished)(const struct hm2_module *module);
     /* HAL name of an output pin of this module ("step"), from which a port makes the second names of the pin's
      * parameters ("stepgen.00.step.invert_output", hal-interface 2.3). NULL for a pin that has no such name, e.g. an
      * input; the function itself may be NULL when no pin has one. */

@@ -196,6 +196,8 @@ struct hm2_plan_facts {
                            * then on, until hm2_plan_touch_all() */
     uint16_t card_rx_udp; /* UDP packets the card has received, modulo 2^16 */
     uint16_t waited_us;   /* how long the card has waited for its timer; 0 for the reply to a plain request */
+    bool before_kept;     /* the reply to a turn: when it came, our write before it was the last one carried out. False:
+                           * that one was lost, or an older one has overtaken it; also for the reply to a plain request */
 };
 HM2_API struct hm2_plan_facts hm2_plan_facts(const struct hm2_plan *plan);
 

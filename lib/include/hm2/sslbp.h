@@ -260,7 +260,9 @@ struct sslbp_reply {
     const uint32_t *cs;        /* [SSLBP_CHANNELS], by channel */
     const uint32_t (*user)[3]; /* [SSLBP_CHANNELS]: interface registers 0..2 */
     bool write_lost;           /* the card did not carry out our last write */
-    int64_t now_ns;            /* when the request was sent */
+    bool early;                /* read in the packet of our last write (a turn): what it started may not be over */
+    bool in_order;             /* of these: our write before it was the last one that the card had carried out */
+    int64_t now_ns;            /* when the request was sent; early: when the registers were read */
 };
 
 struct sslbp_wish {
@@ -313,9 +315,9 @@ enum sslbp_step {
     SSLBP_STEPS
 };
 
-/* What is known of the write with the last command: it was the last one, others followed and no reply came, or a reply
- * has told. */
-enum sslbp_age { SSLBP_AGE_LAST, SSLBP_AGE_UNKNOWN, SSLBP_AGE_KNOWN };
+/* What is known of the write with the last command: it was the last one, one or more followed and no reply came, or a
+ * reply has told. */
+enum sslbp_age { SSLBP_AGE_LAST, SSLBP_AGE_SECOND, SSLBP_AGE_UNKNOWN, SSLBP_AGE_KNOWN };
 
 struct sslbp_engine {
     /* set by the owner */
@@ -327,6 +329,7 @@ struct sslbp_engine {
     bool after_stop_failed; /* a STOP leads to SSLBP_STEP_FAILED */
     bool fresh;             /* a reply was taken since the last write */
     bool clear;             /* it showed a clear command register */
+    bool unfinished;        /* it was early, and the DOIT of its own packet under way: no failure */
     bool sent;              /* the command of this step is with the card */
     uint8_t age;            /* enum sslbp_age */
     bool scanned;           /* no parameter is left to write */
