@@ -16,7 +16,7 @@
 #include "linuxcnc_peer.h"
 #include "process.h"
 
-#define RUN_LIMIT_MS  60000
+#define RUN_LIMIT_MS  240000
 #define LOAD_LIMIT_MS 100000
 #define DATA          TEST_DATA "/linuxcnc"
 
@@ -321,7 +321,7 @@ int main(void)
 {
     Suite *const suite = suite_create("linuxcnc_modules");
     TCase *const tests = tcase_create("modules");
-    tcase_set_timeout(tests, 120);
+    tcase_set_timeout(tests, 270);
     tcase_add_test(tests, what_is_built_is_what_there_are_sources_for_and_what_this_test_loads);
     tcase_add_test(tests, installing_puts_every_module_where_linuxcnc_loads_from_and_uninstalling_takes_it_away);
     tcase_add_test(tests, of_the_folders_that_makefile_modinc_sets_the_one_that_counts_is_taken);
