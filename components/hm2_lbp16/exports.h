@@ -19,6 +19,10 @@ int hm2_tram_add_bspi_frame(char *name, int chan, uint32_t **wbuff, uint32_t **r
 int hm2_uart_setup(char *name, int bitrate, int32_t tx_mode, int32_t rx_mode);
 int hm2_uart_send(char *name, unsigned char data[], int count);
 int hm2_uart_read(char *name, unsigned char data[]);
+int hm2_pktuart_setup(char *name, int bitrate, int32_t tx_mode, int32_t rx_mode, int txclear, int rxclear);
+int hm2_pktuart_send(char *name, unsigned char data[], uint8_t *num_frames, uint16_t frame_sizes[]);
+int hm2_pktuart_read(char *name, unsigned char data[], uint8_t *num_frames, uint16_t *max_frame_length,
+                     uint16_t frame_sizes[]);
 /* Open a port by name, unless *port is one already, and set it; *port is for hm2/serial.h. 0 or a negative number. */
 int hm2_serial_use(const char *name, const struct hm2_serial_settings *settings, struct hm2_serial **port);
 

@@ -42,6 +42,9 @@ EXPORT_SYMBOL(hm2_tram_add_bspi_frame);
 EXPORT_SYMBOL(hm2_uart_setup);
 EXPORT_SYMBOL(hm2_uart_send);
 EXPORT_SYMBOL(hm2_uart_read);
+EXPORT_SYMBOL(hm2_pktuart_setup);
+EXPORT_SYMBOL(hm2_pktuart_send);
+EXPORT_SYMBOL(hm2_pktuart_read);
 EXPORT_SYMBOL(hm2_serial_use);
 
 #define MAX_CARDS 16
