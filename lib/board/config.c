@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <hm2/terminals.h>
+
 #include "absenc_format.h"
 
 #define SPACES    " \t\n\r\v\f"
@@ -171,6 +173,21 @@ static void take_pipelined(struct scan *const scan, const unsigned unused, const
         scan->config->pipelined = (unsigned)number;
 }
 
+/* Connectors count from 1, as for the flash tools. */
+static void take_dbname(struct scan *const scan, const unsigned connector, const char *const value)
+{
+    const struct hm2_terminals *const terminals = hm2_terminals_find(value);
+    if (connector == 0)
+        REFUSE(scan, "config: \"%.*s\": connectors count from 1", SHOWN, scan->token);
+    else if (!terminals)
+        REFUSE(scan,
+               "config: \"%.*s\": the terminals of a daughter board \"%.*s\" are not known; hm2flash --dbname1 with an "
+               "unknown name lists the boards",
+               SHOWN, scan->token, SHOWN, value);
+    else
+        scan->config->dbname[connector - 1] = terminals->name;
+}
+
 /* ---- ssi_chan_N=FORMAT and its kin ---------------------------------------------------------------------------------
  */
 
@@ -221,6 +238,7 @@ static const struct key keys[] = {
     {"pipelined", 0, true, take_pipelined},
     {"adaptive_timeout", 0, false, take_adaptive},
     {"second_request", 0, false, take_second_request},
+    {"dbname", HM2_CFG_CONNECTORS + 1u, true, take_dbname},
     {"sserial_port_", HM2_CFG_SSERIAL_PORTS, true, take_sserial},
     {"ssi_chan_", HM2_CFG_CHANNELS, true, take_ssi},
     {"biss_chan_", HM2_CFG_CHANNELS, true, take_biss},

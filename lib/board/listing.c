@@ -6,6 +6,9 @@
 
 #include "board_private.h"
 
+_Static_assert(HM2_CFG_CONNECTORS == HM2_BOARD_CONNECTORS, "each connector can have a daughter board");
+
+/* Its name stands before the terminal, as one board may be there twice. */
 static void terminal(const struct hm2_board *const board, const unsigned io, char *const text, const size_t size)
 {
     const struct hm2_board_type *const type = &board->type;
@@ -13,20 +16,23 @@ static void terminal(const struct hm2_board *const board, const unsigned io, cha
     const unsigned port = width ? io / width : 0;
     const unsigned pin = width ? io % width : 0;
     const bool known = port < HM2_BOARD_CONNECTORS;
-    const struct hm2_terminals *const terminals =
-        known && type->terminals[port] ? hm2_terminals_find(type->terminals[port]) : NULL;
-    if (terminals && pin < terminals->count)
-        (void)snprintf(text, size, "%s", terminals->terminals[pin]);
+    const char *const connector = known && type->connectors[port] ? type->connectors[port] : "??";
+    const char *const daughter = known ? board->config.dbname[port] : NULL;
+    const char *const name = daughter ? daughter : known ? type->terminals[port] : NULL;
+    const struct hm2_terminals *const terminals = name ? hm2_terminals_find(name) : NULL;
+    if (!terminals || pin >= terminals->count)
+        (void)snprintf(text, size, "%s-%02u", connector, hm2_connector_pin(width, io));
+    else if (daughter)
+        (void)snprintf(text, size, "%s -> %s %s", connector, daughter, terminals->terminals[pin]);
     else
-        (void)snprintf(text, size, "%s-%02u", known && type->connectors[port] ? type->connectors[port] : "??",
-                       hm2_connector_pin(width, io));
+        (void)snprintf(text, size, "%s", terminals->terminals[pin]);
 }
 
 static int describe(const struct hm2_board *const board, const unsigned io, char *const text, const size_t size)
 {
     const struct hm2_pin *const pin = &board->pins[io];
     const struct hm2_pd *const pd = &pin->pd;
-    char place[32], function[32];
+    char place[64], function[32];
     terminal(board, io, place, sizeof place);
     if (!pin->owner)
         return snprintf(text, size, "IO Pin %03u (%s): IOPort\n", io, place);

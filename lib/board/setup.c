@@ -87,6 +87,14 @@ static int check_channels(const struct hm2_board *const board, const char *const
     return err;
 }
 
+static void check_daughters(const struct hm2_board *const board, struct hm2_diag *const diag)
+{
+    for (unsigned i = board->idrom.io_ports; i < HM2_CFG_CONNECTORS; i++)
+        if (board->config.dbname[i])
+            hm2_diag_warn(diag, "%s: config dbname%u has no effect: the card has %u connectors", board->prefix, i + 1u,
+                          board->idrom.io_ports);
+}
+
 static int check_serial(const struct hm2_board *const board, struct hm2_diag *const diag)
 {
     const struct hm2_config *const config = &board->config;
@@ -382,6 +390,7 @@ int hm2_board_setup(struct hm2_board *const board, const unsigned index, struct 
     if (err < 0)
         return err;
     hm2_plan_init(board->plan, board->nonce);
+    check_daughters(board, diag);
     const int checks[] = {check_counts(board, diag), check_serial(board, diag), match_modules(board, diag),
                           prepare_identity(board), check_pipeline(board, diag)};
     for (size_t i = 0; i < sizeof checks / sizeof checks[0]; i++)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Terminal names of daughter boards and of cards with terminals of their own (flash tool reference 2.6; as mesaflash
- * 3.5.16 has them, oddities included: programs compare them). */
+ * 3.5.16 has them, oddities included: programs compare them). The 7I49 is not in that table. */
 #include <hm2/terminals.h>
 
 #include <strings.h>
@@ -185,6 +185,15 @@ static const char *const t_7i48[] = {
     "P3-7,8,15,16",  "P2-1,2,9,10",  "P2-4,5,12,13",  "P2-7,8,15,16", "Internal-EncMux", "P4-20:PWM-Up",
     "P4-20:PWM-Dwn", "P4-24:PWM-Up", "P4-24:PWM-Dwn", "P3-20:PWM-Up", "P3-20:PWM-Dwn",   "P3-24:PWM-Up",
     "P3-24:PWM-Dwn", "P2-20:PWM-Up", "P2-20:PWM-Dwn", "P2-24:PWM-Up", "P2-24:PWM-Dwn",   "/Ena1"};
+/* Analog outputs: Mesa's "7I49 Manual", connectors P4 to P2, as quoted by page in the public wiring tables of
+ * agant172/mazak-vqc20-linuxcnc-retrofit ("7i49 Analog Command Channel Plan", plane_b_pin_crosswalk.csv). Functions of
+ * the pins: PIN_SV6_7I49_72.vhd; those of the resolvers' converter lead to no terminal. */
+static const char *const t_7i49[] = {"/Enable",           "Internal-Resolver", "Internal-Resolver", "Internal-Resolver",
+                                     "Internal-Resolver", "Internal-Resolver", "Internal-Resolver", "Internal-Resolver",
+                                     "Internal-Resolver", "Internal-Resolver", "Internal-Resolver", "P4-20:PWM-Up",
+                                     "P4-20:PWM-Dwn",     "P4-24:PWM-Up",      "P4-24:PWM-Dwn",     "P3-20:PWM-Up",
+                                     "P3-20:PWM-Dwn",     "P3-24:PWM-Up",      "P3-24:PWM-Dwn",     "P2-20:PWM-Up",
+                                     "P2-20:PWM-Dwn",     "P2-24:PWM-Up",      "P2-24:PWM-Dwn",     "/Enable"};
 static const char *const t_7i52[] = {
     "P2-5,6:/Ena",     "P5-1,2,9,10",   "P5-4,5,12,13",   "P5-7,8,15,16",   "P5-17,18,P4-1,2", "P5-20,21,P4-4,5",
     "P5-23,24,P4-7,8", "P3-9,10,17,18", "P3-12,13,20,21", "P3-15,16,23,24", "Internal-EncMux", "P2-21,22",
@@ -262,6 +271,7 @@ static const struct hm2_terminals tables[] = {
     {"7I47", sizeof t_7i47 / sizeof t_7i47[0], t_7i47},
     {"7I47S", sizeof t_7i47s / sizeof t_7i47s[0], t_7i47s},
     {"7I48", sizeof t_7i48 / sizeof t_7i48[0], t_7i48},
+    {"7I49", sizeof t_7i49 / sizeof t_7i49[0], t_7i49},
     {"7I52", sizeof t_7i52 / sizeof t_7i52[0], t_7i52},
     {"7I52S", sizeof t_7i52s / sizeof t_7i52s[0], t_7i52s},
     {"MX3660", sizeof t_mx3660 / sizeof t_mx3660[0], t_mx3660},

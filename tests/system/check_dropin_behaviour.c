@@ -195,6 +195,7 @@ static void compare_point(const struct scenario *const scenario, const unsigned 
 {
     const char *const name = theirs->names[i];
     const struct limit exact = {.share = 1e-12};
+    (void)dropin_table_allows(where, "compared", name);
     struct difference d = compare_columns(scenario, i, j, &exact);
     if (d.cycles == 0)
         return;
@@ -366,6 +367,37 @@ START_TEST(the_same_script_gives_the_same_feedback_and_the_same_registers)
 }
 END_TEST
 
+/* What LinuxCNC's driver makes names of: "%s.encoder.%02d.count" stands in its file. */
+START_TEST(every_module_of_linuxcncs_driver_is_compared_or_it_is_explained_why_not)
+{
+    static char file[4u << 20];
+    const char *const path = driver_files(DRIVER_LINUXCNC)[1];
+    unsigned modules = 0, missing = 0;
+    if (!driver_available(DRIVER_LINUXCNC)) {
+        printf("SKIP: LinuxCNC's hm2_eth is not installed (linuxcnc-uspace)\n");
+        return;
+    }
+    FILE *const f = fopen(path, "rb");
+    ck_assert_msg(f, "%s: %s", path, strerror(errno));
+    const size_t len = fread(file, 1, sizeof file, f);
+    fclose(f);
+    ck_assert_uint_lt(len, sizeof file);
+    for (const char *at = file; (at = memmem(at, len - (size_t)(at - file), "%s.", 3)); at += 3) {
+        char module[16];
+        if (sscanf(at, "%%s.%15[a-z0-9].", module) != 1 || at[3 + strlen(module)] != '.')
+            continue;
+        modules++;
+        const bool explained = dropin_table_has("none", "explained", module);
+        if (explained || (dropin_table_has("names", "compared", module) && dropin_table_has("run", "compared", module)))
+            continue;
+        printf("%s: no row for names and behaviour of %s\n", path, module);
+        missing++;
+    }
+    ck_assert_uint_gt(modules, 200); /* as many names; 24 modules */
+    ck_assert_uint_eq(missing, 0);
+}
+END_TEST
+
 START_TEST(no_row_of_the_table_is_stale)
 {
     if (*compared < scenario_count) {
@@ -379,11 +411,13 @@ END_TEST
 int main(void)
 {
     dropin_table_load(TEST_DATA "/dropin/differences");
+    dropin_table_load(TEST_DATA "/dropin/modules");
     compared = shared_memory(sizeof *compared);
     Suite *const suite = suite_create("dropin behaviour");
     TCase *const tests = tcase_create("behaviour");
     tcase_set_timeout(tests, 120);
     tcase_add_loop_test(tests, the_same_script_gives_the_same_feedback_and_the_same_registers, 0, (int)scenario_count);
+    tcase_add_test(tests, every_module_of_linuxcncs_driver_is_compared_or_it_is_explained_why_not);
     tcase_add_test(tests, no_row_of_the_table_is_stale);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);

@@ -198,6 +198,8 @@ static void compare_points(void)
             differs("missing", theirs->points[i].name, "");
         else if (found[0])
             differs("type", theirs->points[i].name, "");
+        else
+            (void)dropin_table_allows(where, "compared", theirs->points[i].name);
     }
     for (unsigned i = 0; i < ours->count; i++)
         if (!find(theirs, ours->points[i].name, ours->points[i].type))
@@ -340,6 +342,7 @@ static void *shared_memory(const size_t size)
 int main(void)
 {
     dropin_table_load(TEST_DATA "/dropin/differences");
+    dropin_table_load(TEST_DATA "/dropin/modules");
     theirs = shared_memory(sizeof *theirs);
     ours = shared_memory(sizeof *ours);
     Suite *const suite = suite_create("dropin loads");

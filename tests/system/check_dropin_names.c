@@ -290,6 +290,7 @@ static void compare(void)
             differs(a->kind == ALIAS ? "alias-missing" : "missing", a, "there", "missing");
             continue;
         }
+        (void)dropin_table_allows(where, "compared", a->name);
         compare_text("type", a, a->type, b->type);
         compare_text("direction", a, a->direction, b->direction);
         if (rests(a->name))
@@ -349,6 +350,7 @@ END_TEST
 int main(void)
 {
     dropin_table_load(TEST_DATA "/dropin/differences");
+    dropin_table_load(TEST_DATA "/dropin/modules");
     shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (shared == MAP_FAILED)
         return 1;

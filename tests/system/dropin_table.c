@@ -11,6 +11,7 @@
 #define MAX_ROWS 512u
 
 struct row {
+    const char *path;
     char where[64], what[16], name[64], limit[16];
     unsigned line, used;
 };
@@ -39,7 +40,8 @@ static void give_up(const char *const path, const unsigned line, const char *con
 void dropin_table_load(const char *const path)
 {
     char line[512];
-    table = mmap(NULL, sizeof *table, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (!table)
+        table = mmap(NULL, sizeof *table, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (table == MAP_FAILED)
         give_up(path, 0, strerror(errno));
     FILE *const file = fopen(path, "r");
@@ -53,6 +55,7 @@ void dropin_table_load(const char *const path)
         struct row *const row = &table->rows[table->count];
         if (table->count == MAX_ROWS || !parse(line, row))
             give_up(path, number, "expected WHERE WHAT NAME LIMIT REASON, and not too many rows");
+        row->path = path;
         row->line = number;
         table->count++;
     }
@@ -85,10 +88,22 @@ unsigned dropin_table_unused(const char *const scope)
         const struct row *const row = &table->rows[i];
         if (row->used > 0 || !concerns(row, scope))
             continue;
-        printf("line %u allows nothing any more: %s %s %s\n", row->line, row->where, row->what, row->name);
+        printf("%s:%u: nothing like this any more: %s %s %s\n", row->path, row->line, row->where, row->what, row->name);
         unused++;
     }
     return unused;
+}
+
+bool dropin_table_has(const char *const scope, const char *const what, const char *const module)
+{
+    const size_t len = strlen(module);
+    for (unsigned i = 0; i < table->count; i++) {
+        const struct row *const row = &table->rows[i];
+        if (concerns(row, scope) && strcmp(row->what, what) == 0 && strncmp(row->name, module, len) == 0 &&
+            row->name[len] == '.')
+            return true;
+    }
+    return false;
 }
 
 bool dropin_table_wanted(const char *const where)

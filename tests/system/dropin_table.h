@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * The reviewed table of differences between LinuxCNC's driver and ours: tests/data/dropin/differences. A difference
- * that no row allows fails a test, and so does a row that allows nothing any more.
+ * that no row allows fails a test, and so does a row that allows nothing any more. What is compared at all is listed in
+ * tests/data/dropin/modules; a row of which nothing is compared fails a test, too.
  * Rows: WHERE WHAT NAME LIMIT REASON, see the table itself.
  */
 #ifndef TEST_DROPIN_TABLE_H
@@ -10,7 +11,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Read the table, into memory that forked tests share. Call it before the tests run; a bad table ends the program. */
+/* Read the table, or more of it, into memory that forked tests share. Call it before the tests run; a bad table ends
+ * the program. The path is kept. */
 void dropin_table_load(const char *path);
 
 /* Limit of the first row for a difference, which is then in use; NULL when no row allows it. `where` is what the row's
@@ -21,6 +23,9 @@ const char *dropin_table_allows(const char *where, const char *what, const char 
 /* Print every row of a scope ("names", "loads", "run"), which is what its first column begins with, and that allowed
  * nothing since the table was loaded; returns how many these are. */
 unsigned dropin_table_unused(const char *scope);
+
+/* Whether a row of this scope (a shell pattern) and kind is about objects of a module ("encoder"). */
+bool dropin_table_has(const char *scope, const char *what, const char *module);
 
 /* For looking closer: DROPIN_ONLY=PATTERN in the environment runs only what matches it, a shell pattern for what
  * `where` is: DROPIN_ONLY='names/7i93/absolute', DROPIN_ONLY='*motion'. True for all when it is not set. */

@@ -439,6 +439,18 @@ static void pins_are_listed_with_terminal_and_owner(void **state)
     assert_int_equal(hm2_board_describe_pins(f->board, NULL, 0), needed);
 }
 
+static void a_daughter_board_that_is_named_gives_its_terminals(void **state)
+{
+    struct fixture *const f = *state;
+    assert_int_equal(setup_with(f, "dbname3=7i76 dbname4=7I77"), 0);
+    char text[8192];
+    (void)hm2_board_describe_pins(f->board, text, sizeof text);
+    assert_non_null(strstr(text, "IO Pin 017 (TB1-2,3): StepGen #0, pin Step (Output)\n"));
+    assert_non_null(strstr(text, "IO Pin 034 (P1 -> 7I76 TB2-4,5): IOPort\n"));
+    assert_non_null(strstr(text, "IO Pin 050 (P1 -> 7I76 TB3-7,8): IOPort\n"));
+    said(f, "config dbname4 has no effect: the card has 3 connectors");
+}
+
 /* ---- start and stop -----------------------------------------------------------------------------------------------
  */
 
@@ -1288,6 +1300,7 @@ int main(void)
         TEST(what_cannot_be_driven_is_left_alone_unless_it_is_asked_for),
         TEST(what_is_asked_for_must_be_there),
         TEST(pins_are_listed_with_terminal_and_owner),
+        TEST(a_daughter_board_that_is_named_gives_its_terminals),
         TEST(start_confirms_every_register_before_the_first_read),
         TEST(start_gives_up_on_a_card_that_fell_silent),
         TEST(the_first_write_enables_the_watchdog_and_sends_outputs),

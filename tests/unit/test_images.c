@@ -8,6 +8,7 @@
 #include <hm2/board.h>
 #include <hm2/flash.h>
 #include <hm2/sim.h>
+#include <hm2/terminals.h>
 
 #include "idrom_files.h"
 
@@ -261,12 +262,39 @@ static void the_configurations_of_the_7i93_have_their_modules(void **state)
     }
 }
 
+/* Each terminal of the 7I49 stands at the pin that its firmware has the function at. */
+static void terminals_of_the_7i49_are_at_the_pins_of_its_firmware(void **state)
+{
+    (void)state;
+    static struct bench b;
+    const struct sim_card_options options = {.profile = "7i93_sv6_7i49"};
+    const struct hm2_terminals *const terminals = hm2_terminals_find("7i49");
+    assert_non_null(terminals);
+    assert_int_equal(terminals->count, 24);
+    assert_int_equal(load(&b, &options), 0);
+    const struct hm2_pd *const pins = sim_card_idrom(b.card)->pins;
+    static const char *const outputs[] = {"P4-20:PWM-", "P4-24:PWM-", "P3-20:PWM-",
+                                          "P3-24:PWM-", "P2-20:PWM-", "P2-24:PWM-"};
+    for (unsigned pin = 0; pin < 24; pin++) {
+        char wanted[32] = "Internal-Resolver";
+        const unsigned function = pins[pin].secondary_pin & 0x7Fu;
+        if (pins[pin].secondary_tag == HM2_GTAG_PWMGEN && function == 3)
+            (void)snprintf(wanted, sizeof wanted, "/Enable");
+        else if (pins[pin].secondary_tag == HM2_GTAG_PWMGEN)
+            (void)snprintf(wanted, sizeof wanted, "%s%s", outputs[pins[pin].secondary_unit],
+                           function == 1 ? "Up" : "Dwn");
+        assert_string_equal(terminals->terminals[pin], wanted);
+    }
+    release(&b);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_image_that_was_dumped_loads_and_runs),
         cmocka_unit_test(every_card_loads_and_its_pins_have_names),
         cmocka_unit_test(the_configurations_of_the_7i93_have_their_modules),
+        cmocka_unit_test(terminals_of_the_7i49_are_at_the_pins_of_its_firmware),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -38,6 +38,7 @@ enum hm2_config_count {
 #define HM2_CFG_SSERIAL_CHANNELS 8u
 #define HM2_CFG_CHANNELS         32u
 #define HM2_CFG_FORMAT_SIZE      128u
+#define HM2_CFG_CONNECTORS       4u
 
 struct hm2_config {
     int count[HM2_CFG_COUNTS]; /* HM2_CFG_ALL or 0.. */
@@ -53,6 +54,7 @@ struct hm2_config {
     unsigned pipelined;                            /* DPLL timer of the pipelined cycle, 1..4; 0 = plain cycles */
     bool adaptive_timeout;                         /* replies are given up when they are later than usual */
     bool second_request;                           /* and are then asked for once more; implies adaptive_timeout */
+    const char *dbname[HM2_CFG_CONNECTORS];        /* daughter boards as hm2_terminals_find() has them, or NULL */
     char ssi_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];
     char biss_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];
     char fanuc_format[HM2_CFG_CHANNELS][HM2_CFG_FORMAT_SIZE];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Terminal names of daughter boards, and of cards with terminals of their own (flash tool reference 2.6). Constant
- * tables; nothing here allocates.
+ * Terminal names of daughter boards, and of cards with terminals of their own (flash tool reference 2.6; the 7I49 by
+ * its manual). The 7I65 is missing: no public list of its terminals was found. Constant tables; nothing here allocates.
  */
 #ifndef HM2_TERMINALS_H
 #define HM2_TERMINALS_H

@@ -1,12 +1,20 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/* docs/flash-hazards.md names a test for every hazard: each of them exists, and its program runs it. */
+/* docs/flash-hazards.md and docs/module-hazards.md name a test for every hazard: each of them exists, and its program
+ * runs it. */
 #include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define HAZARDS    20u
 #define FILE_BYTES 100000u
+
+/* Their rows are numbered. */
+static const struct {
+    const char *path;
+    char letter;
+    unsigned hazards;
+} pages[] = {{"docs/flash-hazards.md", 'H', 20}, {"docs/module-hazards.md", 'M', 16}};
+#define PAGES (sizeof pages / sizeof pages[0])
 
 static char page[FILE_BYTES], source[FILE_BYTES];
 
@@ -80,12 +88,13 @@ static unsigned check_row(const char *row)
 
 START_TEST(every_hazard_has_a_test)
 {
-    load(page, "docs/flash-hazards.md");
-    for (unsigned i = 1; i <= HAZARDS; i++) {
+    const char letter = pages[_i].letter;
+    load(page, pages[_i].path);
+    for (unsigned i = 1; i <= pages[_i].hazards; i++) {
         char start[16];
-        snprintf(start, sizeof start, "\n| H%u ", i);
+        snprintf(start, sizeof start, "\n| %c%u ", letter, i);
         const char *const row = strstr(page, start);
-        ck_assert_msg(row != NULL, "H%u has no row", i);
+        ck_assert_msg(row != NULL, "%c%u has no row", letter, i);
         ck_assert_uint_ge(check_row(row + 1), 1);
     }
 }
@@ -94,7 +103,7 @@ END_TEST
 START_TEST(everything_else_has_a_test)
 {
     unsigned rows = 0;
-    load(page, "docs/flash-hazards.md");
+    load(page, pages[0].path);
     const char *row = strstr(page, "| what | tests |");
     ck_assert_ptr_nonnull(row);
     row = strchr(strchr(row, '\n') + 1, '\n');
@@ -106,9 +115,9 @@ END_TEST
 
 int main(void)
 {
-    Suite *const suite = suite_create("hazards of the flash");
+    Suite *const suite = suite_create("hazards");
     TCase *const tests = tcase_create("table");
-    tcase_add_test(tests, every_hazard_has_a_test);
+    tcase_add_loop_test(tests, every_hazard_has_a_test, 0, (int)PAGES);
     tcase_add_test(tests, everything_else_has_a_test);
     suite_add_tcase(suite, tests);
     SRunner *const runner = srunner_create(suite);
