@@ -25,7 +25,7 @@ static int run(const char *const first, const char *const second)
 
 START_TEST(help_names_the_options)
 {
-    static const char *const options[] = {"--seconds", "--build", "--out", "--no-load", "--emulate"};
+    static const char *const options[] = {"--seconds", "--build", "--out", "--load", "--no-load", "--emulate"};
     ck_assert_int_eq(run("--help", NULL), 0);
     for (size_t i = 0; i < sizeof options / sizeof options[0]; i++)
         ck_assert_msg(strstr(process.text, options[i]) != NULL, "no %s in: %s", options[i], process.text);
