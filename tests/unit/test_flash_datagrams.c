@@ -7,6 +7,8 @@
  */
 #include <inttypes.h>
 
+#include <hm2/lbp16.h>
+
 #include "flash_torture.h"
 #include "unit.h"
 #include "unruly_link.h"
@@ -138,9 +140,106 @@ static void any_one_datagram_may_be_disturbed(void **state)
         disturb_all(&scenarios[i]);
 }
 
+/* ---- settings and registers ---------------------------------------------------------------------------------------
+ */
+
+#define PORT_DIRECTIONS 0x1100u /* of the first I/O port */
+
+static int write_setting(struct flash_card *const card, const uint16_t value, struct hm2_diag *const diag)
+{
+    const uint16_t words[2] = {value, (uint16_t)(value + 1u)};
+    return flash_card_write_eeprom(card, LBP16_EEPROM_IP, 2, words, diag);
+}
+
+static bool setting_is(struct flash_card *const card, const uint16_t value)
+{
+    const uint16_t *const words = flash_card_info(card)->eeprom + LBP16_EEPROM_IP / 2;
+    return words[0] == value && words[1] == (uint16_t)(value + 1u);
+}
+
+static int write_register(struct flash_card *const card, const uint16_t value, struct hm2_diag *const diag)
+{
+    const uint32_t word = value;
+    return flash_card_write_hm2(card, PORT_DIRECTIONS, 1, &word, diag);
+}
+
+static bool register_is(struct flash_card *const card, const uint16_t value)
+{
+    uint32_t word = 0;
+    assert_int_equal(flash_card_read_hm2(card, PORT_DIRECTIONS, 1, &word, NULL), 0);
+    return word == value;
+}
+
+static const struct store {
+    const char *name;
+    int (*write)(struct flash_card *card, uint16_t value, struct hm2_diag *diag);
+    bool (*is)(struct flash_card *card, uint16_t value);
+} stores[] = {{"setting", write_setting, setting_is}, {"register", write_register, register_is}};
+
+static int write_value(const struct store *const store, struct link *const link, const uint16_t value)
+{
+    struct flash_card *card = NULL;
+    int err = flash_card_new(&card, link, NULL);
+    if (err == 0)
+        err = store->write(card, value, NULL);
+    flash_card_free(card);
+    return err;
+}
+
+static bool holds_value(const struct store *const store, struct link *const link, const uint16_t value)
+{
+    struct flash_card *card = NULL;
+    assert_int_equal(flash_card_new(&card, link, NULL), 0);
+    const bool right = store->is(card, value);
+    flash_card_free(card);
+    return right;
+}
+
+/* The new value, and success; or a network that ended, and the old or the new one. */
+static void store_disturbed(const struct store *const store, struct torture *const t, struct unruly_link *const link,
+                            const struct unruly_fault *const f)
+{
+    enum { OLD = 0x1234, NEW = 0x0F0F };
+    struct link *const good = sim_net_link(t->net);
+    assert_int_equal(write_value(store, good, OLD), 0);
+    unruly_link_set(link, f);
+    const int err = write_value(store, &link->link, NEW);
+    unruly_link_release(link);
+    torture_settle(t);
+    const bool is_new = holds_value(store, good, NEW), is_old = holds_value(store, good, OLD);
+    const bool ended = f->what == UNRULY_GONE && err == HM2_ERR_TIMEOUT && (is_new || is_old);
+    if (!ended && !(err == 0 && is_new))
+        fail_msg("%s: %s %" PRIu64 " %s: %d, %s value", store->name, f->reply ? "reply" : "request", f->at,
+                 unruly_name(f->what), err,
+                 is_new   ? "new"
+                 : is_old ? "old"
+                          : "neither");
+}
+
+static void settings_and_registers_are_stored_whatever_happens_to_one_datagram(void **state)
+{
+    (void)state;
+    struct torture *const t =
+        torture_new(&(struct torture_setup){TORTURE_VERIFY, "7i96s", LATE_BYTES, IMAGE_BYTES, CHIP});
+    struct unruly_link link;
+    unruly_link_init(&link, sim_net_link(t->net));
+    for (size_t i = 0; i < sizeof stores / sizeof stores[0]; i++) {
+        unruly_link_set(&link, &(struct unruly_fault){.at = 0});
+        assert_int_equal(write_value(&stores[i], &link.link, 1), 0);
+        const uint64_t requests = link.seen[0];
+        assert_in_range(requests, 4, 10);
+        for (unsigned k = 0; k < 2u * UNRULY_KINDS; k++)
+            for (uint64_t at = 1; at <= requests; at++)
+                store_disturbed(&stores[i], t, &link,
+                                &(struct unruly_fault){.what = (enum unruly)(k / 2), .reply = k % 2, .at = at});
+    }
+    torture_free(t);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(settings_and_registers_are_stored_whatever_happens_to_one_datagram),
         cmocka_unit_test(any_one_datagram_may_be_disturbed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
