@@ -4,11 +4,14 @@
 #include <string.h>
 #include <strings.h>
 
-/* Size of the payload of real images (flash tool reference 2.2), and how far one may be from it (3.10). */
+/* Size of the payload of real images (flash tool reference 2.2), and how far one may be from it (3.10). The packets of
+ * Xilinx images tell where they end. Nothing in an Efinix image does that is known, but all have the same length from
+ * the sync word on, to which fallback images add padding (3.11): what is shorter is cut off. */
 static const struct {
     const char *part;
-    size_t bytes;
-} image_sizes[] = {{"6slx9tqg144", 340884}, {"6slx16ftg256", 464750}, {"6slx25ftg256", 801602}, {"T20F256", 679155}};
+    size_t bytes, least_from_sync;
+} image_sizes[] = {
+    {"6slx9tqg144", 340884, 0}, {"6slx16ftg256", 464750, 0}, {"6slx25ftg256", 801602, 0}, {"T20F256", 679155, 678394}};
 #define TOLERANCE 100u /* one part in so many */
 
 static const struct {
@@ -179,12 +182,19 @@ static int check_size(const struct flash_image *const image, struct hm2_diag *co
 {
     for (size_t i = 0; i < sizeof image_sizes / sizeof image_sizes[0]; i++) {
         const size_t expected = image_sizes[i].bytes, margin = expected / TOLERANCE;
-        if (strcmp(image->part, image_sizes[i].part) == 0 &&
-            (image->payload_bytes + margin < expected || image->payload_bytes > expected + margin))
+        if (strcmp(image->part, image_sizes[i].part) != 0)
+            continue;
+        if (image->payload_bytes + margin < expected || image->payload_bytes > expected + margin)
             return hm2_diag_add(diag, HM2_ERR_MISMATCH,
                                 "the image has %zu bytes, those for a %s have about %zu: it is cut off or something "
                                 "else",
                                 image->payload_bytes, image->part, expected);
+        const size_t from_sync = image->payload_bytes - image->sync_at, least = image_sizes[i].least_from_sync;
+        if (from_sync < least)
+            return hm2_diag_add(diag, HM2_ERR_MISMATCH,
+                                "the image has %zu bytes from its sync word on, those for a %s have %zu: its end is "
+                                "missing. Load the file again",
+                                from_sync, image->part, least);
     }
     return 0;
 }

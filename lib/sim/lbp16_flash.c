@@ -80,6 +80,8 @@ uint32_t sim_lbp16_flash_id(struct sim_lbp16 *const e)
 
 static void read_data(struct sim_lbp16 *const e)
 {
+    if (e->flash_state == SIM_FLASH_WRITING)
+        commit(e);
     if (e->flash_state != SIM_FLASH_READING) {
         e->flash_state = SIM_FLASH_READING;
         sim_spi_flash_select(&e->flash);

@@ -41,6 +41,12 @@ static const struct wrong wrong_7i96s[] = {
     {"a fallback image", {.area = SIM_AREA_FALLBACK}, NULL, false, "this is a fallback image"},
     {"a user image", {0}, NULL, true, "this is a user image"},
     {"half its size", {.bytes = 300000}, NULL, false, "have about 679155"},
+    {"one byte too short", {.bytes = 678649}, NULL, false, "678393 bytes from its sync word on"},
+    {"a fallback image's, too",
+     {.area = SIM_AREA_FALLBACK, .bytes = 678649},
+     NULL,
+     true,
+     "678393 bytes from its sync word on"},
 };
 
 static void refuse_all(struct flash_rig *const rig, const struct wrong *const rows, const size_t count)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * The programmer while the power goes in the midst of page programs and erases, and while the network loses, repeats,
- * delays and cuts datagrams. FLASH_TORTURE=N makes N times as many runs; from 5 on the power is cut in every page
- * program and erase of images that differ in two sectors, and there are more than 2,000 runs of each kind.
+ * delays and cuts datagrams, with images that differ in two sectors. FLASH_TORTURE=N makes N times as many runs; from 5
+ * on there are more than 2,000 of each kind, and from 16 on the power is cut in every page program and erase.
  */
 #include <inttypes.h>
 #include <limits.h>

@@ -6,6 +6,7 @@
 #include <hm2/bytes.h>
 #include <hm2/lbp16.h>
 #include <hm2/sim.h>
+#include <hm2/sim_flash.h>
 
 #include "hex.h"
 #include "replay_csv.h"
@@ -331,6 +332,55 @@ static void flash_pages_are_erased_written_and_read_as_the_manual_shows(void **s
     sim_card_free(card);
 }
 
+/* Seed 000, "FLASH MEMORY REGISTERS": what starts the write of a page that has been sent. */
+static void a_page_is_written_when_anything_else_is_done_with_the_flash(void **state)
+{
+    static const struct {
+        const char *what, *reply;
+    } rows[] = {
+        {"01CE000000000000", ""},         /* write the address */
+        {"014E0000", "04001000"},         /* read it */
+        {"014E0400", "FFFFFFFF"},         /* read data, which come from behind the page's */
+        {"014E0800", "14000000"},         /* read the ID */
+        {"01CE0C0000000000", "FFFFFFFF"}, /* erase the sector, the new page with it */
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct sim_card *const card = card_of("7i96s");
+        const bool erases = i == sizeof rows / sizeof rows[0] - 1;
+        char request[128];
+        snprintf(request, sizeof request, "01D91A00035A 01CE000000001000 01CE0400 12345678 %s", rows[i].what);
+        exchange(card, request, erases ? "" : rows[i].reply);
+        assert_int_equal(sim_card_flash_counts(card).programs, 1);
+        assert_int_equal(sim_card_flash_counts(card).erases, erases);
+        exchange(card, "01CE000000001000 014E0400", erases ? rows[i].reply : "12345678");
+        sim_card_free(card);
+    }
+}
+
+static void the_key_to_the_flash_is_gone_with_its_datagram(void **state)
+{
+    (void)state;
+    struct sim_card *const card = card_of("7i96s");
+    exchange(card, "01D91A00035A 01591A00", "035A");
+    exchange(card, "01591A00", "0000");
+    exchange(card, "01CE000000001000 01CE0C0000000000 014E0000", "");
+    assert_int_equal(sim_card_flash_counts(card).operations, 0);
+    sim_card_free(card);
+}
+
+static void addresses_of_the_flash_wrap_at_its_end(void **state)
+{
+    (void)state;
+    struct sim_card *const card = card_of("7i96s");
+    exchange(card, "01D91A00035A 01CE000000001F00 01CE0400 12345678 014E0000", "04001F00");
+    exchange(card, "01CE000000003F00 014E0400", "12345678");
+    exchange(card, "01D91A00035A 01CE000000003F00 01CE0C0000000000 014E0000", "00003F00");
+    exchange(card, "01CE000000001F00 014E0400", "FFFFFFFF");
+    assert_int_equal(sim_card_flash_counts(card).last_erase, 0x1F0000);
+    sim_card_free(card);
+}
+
 static void a_page_write_wraps_within_its_page(void **state)
 {
     (void)state;
@@ -452,6 +502,9 @@ int main(void)
         cmocka_unit_test(a_reset_makes_the_card_deaf_for_half_a_second),
         cmocka_unit_test(a_reload_through_the_icap_reconfigures_the_fpga),
         cmocka_unit_test(flash_pages_are_erased_written_and_read_as_the_manual_shows),
+        cmocka_unit_test(a_page_is_written_when_anything_else_is_done_with_the_flash),
+        cmocka_unit_test(the_key_to_the_flash_is_gone_with_its_datagram),
+        cmocka_unit_test(addresses_of_the_flash_wrap_at_its_end),
         cmocka_unit_test(a_page_write_wraps_within_its_page),
         cmocka_unit_test(a_truncated_write_takes_what_the_memory_holds),
         cmocka_unit_test(a_card_that_is_busy_takes_the_next_packet_afterwards),
