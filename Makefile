@@ -177,7 +177,8 @@ endef
 $(foreach t,$(TOOLS),$(eval $(call tool_rule,$(t))))
 $(BUILDDIR)/%: TOOL_LIBS = $(SIM_A) $(LIB_A)
 # The host exports its HAL and RTAPI calls to the modules it loads, so every object of it must be linked in.
-$(BUILDDIR)/hm2host: TOOL_LIBS = -Wl,--whole-archive $(HOST_A) -Wl,--no-whole-archive $(LIB_A) -rdynamic -ldl $(EDIT_LIBS)
+# Its threads must not look up symbols in their first cycles.
+$(BUILDDIR)/hm2host: TOOL_LIBS = -Wl,-z,now -Wl,--whole-archive $(HOST_A) -Wl,--no-whole-archive $(LIB_A) -rdynamic -ldl $(EDIT_LIBS)
 
 # Hashes of image files and dumps.
 MD_LIBS ?= -lmd

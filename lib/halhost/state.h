@@ -85,7 +85,7 @@ struct hh_thread {
     bool created;  /* the POSIX thread exists */
     bool realtime; /* it has realtime priority */
     pthread_t thread;
-    int64_t first_ns;
+    _Atomic int64_t first_ns; /* 0 until all threads exist */
     hal_s32_t **time;
     hal_s32_t *tmax;
     _Atomic(struct hh_schedule *) schedule;

@@ -23,6 +23,7 @@ enum {
     SLICE_NS = 100000000, /* a sleeping thread looks at the stop flag this often */
     STOP_NS_LIMIT_S = 5,  /* a function that takes longer is taken to hang */
     QUIESCE_STEP_NS = 20000,
+    START_LEAD_NS = 1000000, /* from the last thread's creation to time zero: for each to see it */
 };
 
 int64_t hh_now_ns(void)
@@ -108,11 +109,30 @@ static void record(struct hh_thread *const thread, const int64_t latency_ns, con
         set_s32(thread->tmax, busy_ns);
 }
 
+static void nap(void)
+{
+    const struct timespec step = {.tv_nsec = QUIESCE_STEP_NS};
+    (void)clock_nanosleep(CLOCK_MONOTONIC, 0, &step, NULL);
+}
+
+/* When the first cycle is due: not before all threads exist, because a locked stack takes milliseconds to make. 0 when
+ * the thread shall end before. */
+static int64_t await_first(const struct hh_thread *const thread)
+{
+    int64_t first_ns = 0;
+    while (!first_ns && !atomic_load_explicit(&thread->stop, memory_order_acquire)) {
+        first_ns = atomic_load_explicit(&thread->first_ns, memory_order_acquire);
+        if (!first_ns)
+            nap();
+    }
+    return first_ns;
+}
+
 static void *thread_main(void *const argument)
 {
     struct hh_thread *const thread = argument;
     hh_task_enter(thread->id);
-    int64_t due_ns = thread->first_ns, last_ns = 0;
+    int64_t due_ns = await_first(thread), last_ns = 0;
     while (sleep_until(thread, due_ns)) {
         const int64_t begin_ns = hh_now_ns();
         const int64_t end_ns = run_cycle(thread, begin_ns);
@@ -129,12 +149,6 @@ static void *thread_main(void *const argument)
         }
     }
     return NULL;
-}
-
-static void nap(void)
-{
-    const struct timespec step = {.tv_nsec = QUIESCE_STEP_NS};
-    (void)clock_nanosleep(CLOCK_MONOTONIC, 0, &step, NULL);
 }
 
 int hh_thread_quiesce(const struct hh_thread *const thread, struct hm2_diag *const diag)
@@ -225,10 +239,9 @@ static void warn_realtime(struct hh *const host, const int error)
                strerror(error));
 }
 
-static int start_one(struct hh *const host, struct hh_thread *const thread, const int64_t first_ns,
-                     struct hm2_diag *const diag)
+static int start_one(struct hh *const host, struct hh_thread *const thread, struct hm2_diag *const diag)
 {
-    thread->first_ns = first_ns + thread->period_ns;
+    atomic_store(&thread->first_ns, 0);
     atomic_store(&thread->stop, false);
     int error = host->options.no_realtime ? EPERM : create(host, thread, true);
     if (error == EPERM) {
@@ -239,6 +252,11 @@ static int start_one(struct hh *const host, struct hh_thread *const thread, cons
     return error
                ? hm2_diag_add(diag, HM2_ERR_NOMEM, "cannot start thread '%s': %s", thread->names.name, strerror(error))
                : 0;
+}
+
+static void let_go(struct hh_thread *const thread, const int64_t zero_ns)
+{
+    atomic_store_explicit(&thread->first_ns, zero_ns + thread->period_ns, memory_order_release);
 }
 
 int hh_threads_start(struct hh *const host, struct hm2_diag *const diag)
@@ -255,14 +273,16 @@ int hh_threads_start(struct hh *const host, struct hm2_diag *const diag)
         return 0;
     lock_memory(host);
     host->running = true;
-    const int64_t now_ns = hh_now_ns();
     for (size_t i = 0; i < host->threads.count; i++) {
-        const int err = start_one(host, host->threads.items[i], now_ns, diag);
+        const int err = start_one(host, host->threads.items[i], diag);
         if (err) {
             (void)hh_threads_stop(host, diag);
             return err;
         }
     }
+    const int64_t zero_ns = hh_now_ns() + START_LEAD_NS;
+    for (size_t i = 0; i < host->threads.count; i++)
+        let_go(host->threads.items[i], zero_ns);
     return 0;
 }
 
@@ -399,7 +419,12 @@ int hh_thread_new(struct hh *const host, const char *const name, const unsigned 
         free(thread);
         return err;
     }
-    return host->running ? start_one(host, thread, hh_now_ns(), diag) : 0;
+    if (!host->running)
+        return 0;
+    err = start_one(host, thread, diag);
+    if (!err)
+        let_go(thread, hh_now_ns());
+    return err;
 }
 
 int hh_thread_delete(struct hh *const host, struct hh_thread *const thread, struct hm2_diag *const diag)

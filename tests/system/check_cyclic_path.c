@@ -248,7 +248,7 @@ static void expect_no_sleep(const struct cycle *const c)
 START_TEST(spinning_is_receives_alone)
 {
     ck_assert_int_eq(setenv("RECEIVE", "spin", 1), 0);
-    if (trace_file("cyclic-1.hal", "500000000", "none", CYCLES, expect_no_sleep))
+    if (trace_file("cyclic-1.hal", "500000000", "delay=300", CYCLES, expect_no_sleep))
         ck_assert_uint_gt(spun_receives, CYCLES);
 }
 END_TEST
