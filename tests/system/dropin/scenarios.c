@@ -559,7 +559,7 @@ static const struct event remote_events[] = {
     {480, 0, REMOTE, 0, REMOTE_ENCODER_0, 30000, 0},
 };
 
-/* ---- latching by index and by probe, of step generators and of encoders: both edges, armed and not, both at once */
+/* ---- latching by index and by probe, of step generators and of encoders: both edges, armed and not */
 
 #define LATCH_ENCODER_PROBE(cycle, level)                           \
     {                                                               \
