@@ -694,7 +694,8 @@ static const struct event shots_events[] = {
         cycle, 0, INPUT, HM2_GTAG_INMUX, 0, INMUX_INPUT + (input), !(level) \
     }
 /* Inputs are on when low. A turn of four edges at inputs 0 and 1. */
-#define HANDWHEEL(cycle) MUXED(cycle, 1, 1), MUXED(cycle + 5, 0, 1), MUXED(cycle + 10, 1, 0), MUXED(cycle + 15, 0, 0)
+#define HANDWHEEL(cycle) \
+    MUXED(cycle, 1, 1), MUXED((cycle) + 5, 0, 1), MUXED((cycle) + 10, 1, 0), MUXED((cycle) + 15, 0, 0)
 
 static const struct setting muxed_settings[] = {
     {0, "watchdog.timeout_ns", 20000000}, {50, "inmux.00.input-05-slow", 1},  {60, "inmux.00.enc0_4xmode", 1},
