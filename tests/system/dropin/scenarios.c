@@ -559,7 +559,7 @@ static const struct event remote_events[] = {
     {480, 0, REMOTE, 0, REMOTE_ENCODER_0, 30000, 0},
 };
 
-/* ---- latching by index and by probe, of step generators and of encoders: both edges, armed and not, both at once */
+/* ---- latching by index and by probe, of step generators and of encoders: both edges, armed and not */
 
 #define LATCH_ENCODER_PROBE(cycle, level)                           \
     {                                                               \
@@ -694,7 +694,8 @@ static const struct event shots_events[] = {
         cycle, 0, INPUT, HM2_GTAG_INMUX, 0, INMUX_INPUT + (input), !(level) \
     }
 /* Inputs are on when low. A turn of four edges at inputs 0 and 1. */
-#define HANDWHEEL(cycle) MUXED(cycle, 1, 1), MUXED(cycle + 5, 0, 1), MUXED(cycle + 10, 1, 0), MUXED(cycle + 15, 0, 0)
+#define HANDWHEEL(cycle) \
+    MUXED(cycle, 1, 1), MUXED((cycle) + 5, 0, 1), MUXED((cycle) + 10, 1, 0), MUXED((cycle) + 15, 0, 0)
 
 static const struct setting muxed_settings[] = {
     {0, "watchdog.timeout_ns", 20000000}, {50, "inmux.00.input-05-slow", 1},  {60, "inmux.00.enc0_4xmode", 1},
@@ -786,6 +787,10 @@ const struct scenario scenarios[] = {
              .reached = {{"encoder.03.count", 500}, {"encoder.06.count", 500}, {"stepgen.00.counts", 1000}}),
     SCENARIO(settings, "7i96s", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
     SCENARIO(settings, "7i93", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
+    SCENARIO(settings, "7i93", "", 2560, .settle = 64, .keeps = settings_keeps,
+             .firmware = TEST_DATA "/firmware/latch_48.hex"),
+    SCENARIO(settings, "7i93", "", 2560, .settle = 64, .keeps = settings_keeps,
+             .firmware = TEST_DATA "/firmware/inmux_48.hex"),
     SCENARIO(ports, "7i80hd-16", "", 1280, .settle = 64, .keeps = settings_keeps, .reached = {{"gpio.071.in", 1}}),
     SCENARIO(octal, "7i93_2x7i65", "", 1200, .has_7i65 = true,
              .reached = {{"7i65.volts.0", 9.99},
