@@ -46,8 +46,8 @@ void pkt_crowd_see(struct pkt_crowd *const crowd, const struct pkt_sight *const 
     const bool runs = !sight->still && !sight->cleared && sight->taken == 0 && sight->frames == 0;
     if (!runs)
         crowd->run_ns = sight->received_ns;
-    else if (!crowd->runs && crowd->run_ns < sight->sent_ns - crowd->begun_ns)
-        crowd->run_ns = sight->sent_ns - crowd->begun_ns;
+    else if (!crowd->runs && crowd->run_ns < sight->received_ns - crowd->begun_ns)
+        crowd->run_ns = sight->received_ns - crowd->begun_ns;
     crowd->runs = runs;
     crowd->run_seen_ns = sight->sent_ns;
     crowd->before_ns = sight->sent_ns;

@@ -9,6 +9,8 @@
 
 /* Fails the running test when the file cannot be read or is malformed. */
 void load_image(const char *path, struct hm2_image *image);
+/* Of the first descriptor with this tag in the image's module table. Fails the running test when there is none. */
+void set_image_version(struct hm2_image *image, uint8_t gtag, uint8_t version);
 /* Whole file, NUL terminated, from malloc. */
 char *load_text(const char *path, size_t *len);
 

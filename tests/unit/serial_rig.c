@@ -33,3 +33,21 @@ void serial_rig_echo(struct sim_bench *bench, const uint8_t gtag)
     const bool uart = gtag == HM2_GTAG_UART_TX;
     assert_int_equal(sim_card_serial(bench->card, gtag, 0, uart ? echo_uart : echo_pktuart, bench), 0);
 }
+
+static void hear(void *context, uint8_t byte)
+{
+    struct serial_ear *const ear = context;
+    if (ear->heard < sizeof ear->byte)
+        ear->byte[ear->heard] = byte;
+    ear->heard++;
+}
+
+void serial_rig_listen(struct sim_bench *bench, struct serial_ear *ear)
+{
+    assert_int_equal(sim_card_serial(bench->card, HM2_GTAG_PKTUART_TX, 0, hear, ear), 0);
+}
+
+void serial_rig_say(struct sim_bench *bench, const void *bytes, const size_t len)
+{
+    assert_int_equal(sim_card_serial_put(bench->card, HM2_GTAG_PKTUART_TX, 0, bytes, len), len);
+}

@@ -13,4 +13,12 @@ struct hm2_serial *serial_rig_open(struct sim_bench *bench, enum hm2_serial_kind
 /* The world outside sends back what it hears from port 0 of the module; it lasts as long as the bench. */
 void serial_rig_echo(struct sim_bench *bench, uint8_t gtag);
 
+/* The world outside: what it heard, and what it says to port 0 of the packet UARTs. */
+struct serial_ear {
+    size_t heard;
+    uint8_t byte[4096]; /* the first that were heard */
+};
+void serial_rig_listen(struct sim_bench *bench, struct serial_ear *ear);
+void serial_rig_say(struct sim_bench *bench, const void *bytes, size_t len);
+
 #endif

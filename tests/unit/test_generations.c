@@ -13,7 +13,6 @@
 
 #define TARGET      700.0
 #define MOTOR_SPEED 20000 /* counts a second at full duty */
-#define MD_WORDS    3u
 
 struct generation {
     const char *image; /* NULL: the card's own */
@@ -21,25 +20,13 @@ struct generation {
     const char *has, *lacks; /* points that come and go with the version */
 };
 
-/* The word of the descriptor that has tag and version, in the image's own module table. */
-static void set_version(struct hm2_image *const image, const uint8_t gtag, const uint8_t version)
-{
-    for (uint32_t *md = image->rom + image->rom[1] / 4; *md & 0xFFu; md += MD_WORDS) {
-        if ((*md & 0xFFu) != gtag)
-            continue;
-        *md = (*md & 0xFFFF00FFu) | (uint32_t)version << 8;
-        return;
-    }
-    fail_msg("no module 0x%02X", gtag);
-}
-
 static struct sim_bench *open_bench(const struct generation *const g, const char *const profile)
 {
     static struct hm2_image image;
     struct sim_card_options options = {.profile = profile, .seed = 1};
     if (g->image) {
         load_image(g->image, &image);
-        set_version(&image, g->gtag, g->version);
+        set_image_version(&image, g->gtag, g->version);
         options.image = &image;
     }
     struct sim_bench *const bench = sim_bench_of(&options, "");

@@ -2,6 +2,7 @@
 /* UART and PktUART as byte streams, looped back on simulated cards, in virtual time. */
 #include "unit.h"
 
+#include "pktuart_crowd.h"
 #include "serial_rig.h"
 
 struct loop {
@@ -449,6 +450,29 @@ static void a_thread_that_stalls_costs_short_messages_nothing(void **state)
     }
 }
 
+/* The frame that it shows may have begun just before the card answered. */
+static void a_reply_that_took_long_makes_no_frame_endless(void **state)
+{
+    static const struct {
+        int64_t sent_us, received_us;
+        bool still, endless;
+    } rows[] = {{0, 100, true, false},
+                {1000, 45000, false, false},
+                {45050, 45100, false, false},
+                {50000, 50100, false, false},
+                {58000, 58100, false, true}};
+    struct pkt_crowd crowd = {0};
+    (void)state;
+    pkt_crowd_init(&crowd, 1000000, false);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const struct pkt_sight sight = {
+            .sent_ns = rows[i].sent_us * 1000, .received_ns = rows[i].received_us * 1000, .still = rows[i].still};
+        pkt_crowd_see(&crowd, &sight);
+        if (pkt_crowd_is_endless(&crowd) != rows[i].endless)
+            fail_msg("row %zu: %s", i, rows[i].endless ? "not endless" : "endless");
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -457,6 +481,7 @@ int main(void)
         cmocka_unit_test(outputs_have_the_second_names_of_linuxcnc),
         cmocka_unit_test(a_full_ring_takes_no_more),
         cmocka_unit_test(a_thread_that_stalls_costs_a_loop_nothing),
+        cmocka_unit_test(a_reply_that_took_long_makes_no_frame_endless),
         cmocka_unit_test(what_the_card_cannot_keep_is_counted_and_nothing_wrong_arrives),
         cmocka_unit_test(a_thread_that_stalls_costs_short_messages_nothing),
         cmocka_unit_test(late_replies_cost_no_byte),

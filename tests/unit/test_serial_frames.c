@@ -119,17 +119,6 @@ static void frames_come_back_whole_and_one_by_one(void **state)
     }
 }
 
-struct ear {
-    const uint8_t *expected;
-    size_t heard, wrong;
-};
-
-static void hear(void *context, uint8_t byte)
-{
-    struct ear *const ear = context;
-    ear->wrong += byte != ear->expected[ear->heard++ % HM2_SERIAL_FRAME_BYTES];
-}
-
 static void the_longest_frames_go_out(void **state)
 {
     uint8_t bytes[HM2_SERIAL_FRAME_BYTES];
@@ -137,15 +126,16 @@ static void the_longest_frames_go_out(void **state)
     for (size_t i = 0; i < sizeof bytes; i++)
         bytes[i] = (uint8_t)(i * 31u + i / 251u);
     for (size_t i = 0; i < ROWS; i++) {
-        struct ear ear = {.expected = bytes};
+        struct serial_ear ear = {0};
         struct rig rig = start(&rows[i]);
-        assert_int_equal(sim_card_serial(rig.bench->card, HM2_GTAG_PKTUART_TX, 0, hear, &ear), 0);
+        serial_rig_listen(rig.bench, &ear);
         for (unsigned n = 0; n < 3; n++)
             assert_int_equal(hm2_serial_put_frame(rig.port, bytes, sizeof bytes), 0);
         for (unsigned n = 0; n < 400 && ear.heard < 3 * sizeof bytes; n++)
             sim_bench_cycle(rig.bench);
         assert_int_equal(ear.heard, 3 * sizeof bytes);
-        assert_int_equal(ear.wrong, 0);
+        for (size_t n = 0; n < 3; n++)
+            assert_memory_equal(ear.byte + n * sizeof bytes, bytes, sizeof bytes);
         sim_bench_free(rig.bench);
     }
 }
@@ -213,30 +203,19 @@ static void a_uart_has_no_frames(void **state)
 /* ---- from outside --------------------------------------------------------------------------------------------------
  */
 
-static void ignore(void *context, uint8_t byte)
-{
-    (void)context;
-    (void)byte;
-}
-
-static void say(const struct rig *rig, const char *text)
-{
-    const size_t len = strlen(text);
-    assert_int_equal(sim_card_serial_put(rig->bench->card, HM2_GTAG_PKTUART_TX, 0, (const uint8_t *)text, len), len);
-}
-
 static void a_deaf_port_hears_nothing(void **state)
 {
     struct hm2_serial_settings settings = settings_of(&rows[1]);
+    struct serial_ear ear = {0};
     (void)state;
     struct rig rig = start(&rows[1]);
-    assert_int_equal(sim_card_serial(rig.bench->card, HM2_GTAG_PKTUART_TX, 0, ignore, NULL), 0);
+    serial_rig_listen(rig.bench, &ear);
     for (unsigned deaf = 0; deaf < 2; deaf++) {
         settings.deaf = deaf > 0;
         assert_int_equal(hm2_serial_set(rig.port, &settings, &rig.bench->diag), 0);
         for (unsigned i = 0; i < 20; i++) {
             if (i == 5)
-                say(&rig, "hello");
+                serial_rig_say(rig.bench, "hello", 5);
             sim_bench_cycle(rig.bench);
         }
         assert_int_equal(hm2_serial_next_frame(rig.port), deaf ? 0 : 5);
@@ -249,10 +228,11 @@ static void a_deaf_port_hears_nothing(void **state)
 static void a_long_frame_with_parity_is_not_taken_for_an_endless_one(void **state)
 {
     static const uint8_t bytes[960];
+    struct serial_ear ear = {0};
     (void)state;
     struct rig rig = start(&rows[2]);
-    assert_int_equal(sim_card_serial(rig.bench->card, HM2_GTAG_PKTUART_TX, 0, ignore, NULL), 0);
-    assert_int_equal(sim_card_serial_put(rig.bench->card, HM2_GTAG_PKTUART_TX, 0, bytes, sizeof bytes), sizeof bytes);
+    serial_rig_listen(rig.bench, &ear);
+    serial_rig_say(rig.bench, bytes, sizeof bytes);
     for (unsigned i = 0; i < 120; i++)
         sim_bench_cycle(rig.bench);
     assert_int_equal(hm2_serial_next_frame(rig.port), sizeof bytes);
@@ -265,17 +245,18 @@ static void a_frame_with_an_error_is_not_given_but_told(void **state)
 {
     uint8_t got[RX_BYTES];
     struct row row = rows[3];
+    struct serial_ear ear = {0};
     (void)state;
     row.baud = 9600;
     struct hm2_serial_settings settings = settings_of(&row);
     struct rig rig = start(&row);
-    assert_int_equal(sim_card_serial(rig.bench->card, HM2_GTAG_PKTUART_TX, 0, ignore, NULL), 0);
-    say(&rig, "eleven bytes");
+    serial_rig_listen(rig.bench, &ear);
+    serial_rig_say(rig.bench, "twelve bytes", 12);
     settings.parity = HM2_PARITY_ODD;
     assert_int_equal(hm2_serial_set(rig.port, &settings, &rig.bench->diag), 0);
     for (unsigned i = 0; i < 60; i++) {
         if (i == 40)
-            say(&rig, "good");
+            serial_rig_say(rig.bench, "good", 4);
         sim_bench_cycle(rig.bench);
     }
     assert_true(hm2_serial_lost(rig.port));
@@ -294,12 +275,13 @@ static void frames_that_nobody_takes_stay_and_what_the_card_loses_is_counted(voi
 {
     const unsigned frames = 400;
     uint8_t got;
+    struct serial_ear ear = {0};
     (void)state;
     struct rig rig = start(&rows[1]);
-    assert_int_equal(sim_card_serial(rig.bench->card, HM2_GTAG_PKTUART_TX, 0, ignore, NULL), 0);
+    serial_rig_listen(rig.bench, &ear);
     for (unsigned i = 0; i < frames; i++) {
         const uint8_t byte = (uint8_t)(i % 250u);
-        assert_int_equal(sim_card_serial_put(rig.bench->card, HM2_GTAG_PKTUART_TX, 0, &byte, 1), 1);
+        serial_rig_say(rig.bench, &byte, 1);
         sim_bench_cycle(rig.bench);
     }
     unsigned given = 0;
@@ -415,8 +397,8 @@ static void a_frame_of_which_a_part_may_be_missing_is_not_sent_and_cuts_no_other
         bytes[i] = (uint8_t)i;
     struct rig rig = start(&slow);
     struct weather weather = {&rig, LOSE_REPLIES};
-    struct ear ear = {.expected = bytes};
-    assert_int_equal(sim_card_serial(rig.bench->card, HM2_GTAG_PKTUART_TX, 0, hear, &ear), 0);
+    struct serial_ear ear = {0};
+    serial_rig_listen(rig.bench, &ear);
     sim_net_on_taken(rig.bench->net, blow, &weather);
     for (size_t i = 0; i < 3; i++)
         assert_int_equal(hm2_serial_put_frame(rig.port, i < 2 ? bytes : bytes + lens[0], lens[i]), 0);
@@ -427,7 +409,7 @@ static void a_frame_of_which_a_part_may_be_missing_is_not_sent_and_cuts_no_other
     for (unsigned i = 0; i < 90; i++)
         sim_bench_cycle(rig.bench);
     assert_int_equal(ear.heard, lens[0] + lens[2]);
-    assert_int_equal(ear.wrong, 0);
+    assert_memory_equal(ear.byte, bytes, ear.heard);
     assert_int_equal(hm2_serial_counts(rig.port).tx_uncertain, lens[1]);
     sim_bench_free(rig.bench);
 }

@@ -1,6 +1,5 @@
-component frames_test """Frames through a packet UART whose wires are joined, by LinuxCNC's own declarations.
-
-SPDX-License-Identifier: GPL-2.0-or-later""";
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+component frames_test "frames through a packet UART whose wires are joined, by LinuxCNC's own declarations";
 pin out u32 sent "frames given to the card";
 pin out u32 received "frames that came back as they were sent";
 pin out u32 wrong "frames that did not";
