@@ -161,9 +161,14 @@ static int probe_rate(struct hm2_setup *const setup, const uint16_t address, uns
 /* ---- reply ----------------------------------------------------------------------------------------------------------
  */
 
+static unsigned words_of(const unsigned bytes)
+{
+    return (bytes + 3u) / 4u;
+}
+
 static unsigned sent_words(const struct pktuart *const p)
 {
-    return (p->port.sent_bytes + 3u) / 4u;
+    return words_of(p->port.sent_bytes);
 }
 
 static void queue_frame(struct pktuart *const p)
@@ -246,6 +251,13 @@ static unsigned words_to_send(const struct pktuart *const p)
     return free_words < WORDS ? free_words : WORDS;
 }
 
+static void aim(struct hm2_serial *const port, const unsigned bytes)
+{
+    struct pktuart *const p = (struct pktuart *)port;
+    queue_aim(&p->out, words_of(bytes));
+    hm2_put_le16(p->out_count.address, bytes ? port->tx_reg[SERIAL_COUNT] : HM2_PLAN_NOWHERE);
+}
+
 static void send_frame(struct hm2_serial *const port)
 {
     struct pktuart *const p = (struct pktuart *)port;
@@ -253,12 +265,11 @@ static void send_frame(struct hm2_serial *const port)
     const unsigned most = words_to_send(p);
     port->sent_bytes = may_send(p) ? (unsigned)ring_get(&port->tx, bytes, (size_t)4u * most) : 0;
     const unsigned words = sent_words(p);
-    queue_aim(&p->out, words);
+    aim(port, port->sent_bytes);
     for (unsigned n = 0; n < words; n++) {
         const struct queue_place at = queue_place(&p->out, words, n);
         hm2_window_set(at.window, at.word, hm2_get_le32(bytes + 4u * n));
     }
-    hm2_put_le16(p->out_count.address, words ? port->tx_reg[SERIAL_COUNT] : HM2_PLAN_NOWHERE);
     hm2_window_set(&p->out_count, 0, port->sent_bytes);
 }
 
@@ -271,8 +282,14 @@ static void ask(struct hm2_serial *const port)
     pkt_rx_ask(&p->rx, port, set_up && !p->rx.clearing);
 }
 
-static const struct serial_ops ops = {
-    .open = open_port, .set = set_port, .take = take, .late = late, .miss = miss, .send = send_frame, .ask = ask};
+static const struct serial_ops ops = {.open = open_port,
+                                      .set = set_port,
+                                      .take = take,
+                                      .late = late,
+                                      .miss = miss,
+                                      .send = send_frame,
+                                      .aim = aim,
+                                      .ask = ask};
 
 static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 {

@@ -65,6 +65,7 @@ struct hm2_serial {
     bool open;
     bool awaiting;           /* a write and a request with our words are on their way */
     bool resend;             /* the last write was lost: the same again */
+    bool held;               /* a turn had no reply: whether sent_bytes arrived is told by the next one */
     unsigned sent_bytes;     /* in the last write, until it is known to have arrived */
     int64_t sent_ns, now_ns; /* take: of the request, and of its reply; late and ask: now */
     struct hm2_serial_settings settings;
@@ -81,6 +82,7 @@ struct serial_ops {
     void (*late)(struct hm2_serial *port, uint64_t request); /* one that was given up */
     void (*miss)(struct hm2_serial *port);                   /* no fresh reply since the last write */
     void (*send)(struct hm2_serial *port);                   /* the next write, unless the last is sent again */
+    void (*aim)(struct hm2_serial *port, unsigned bytes);    /* so many of the bytes in the write go to the FIFO */
     void (*ask)(struct hm2_serial *port);                    /* the next request */
 };
 
