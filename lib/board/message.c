@@ -173,8 +173,7 @@ static void say_pipeline(const struct text *const text, const char *const what, 
 {
     SAY(text,
         "%s: %s. Of a period of %u us the thread needs up to %u us until it writes, the card waits up to %u us, "
-        "packets are on their way for %u us; so far %u replies were late, %u were read before smart-serial transfers "
-        "were over",
+        "packets are on their way for %u us; so far %u replies were late, %u were read before transfers were over",
         text->board->prefix, what, (unsigned)words[BOARD_PIPELINE_PERIOD_US], (unsigned)words[BOARD_PIPELINE_WORK_US],
         (unsigned)words[BOARD_PIPELINE_WAIT_US], (unsigned)words[BOARD_PIPELINE_RTT_US],
         (unsigned)words[BOARD_PIPELINE_LATE], (unsigned)words[BOARD_PIPELINE_EARLY]);
@@ -183,8 +182,8 @@ static void say_pipeline(const struct text *const text, const char *const what, 
 static void say_no_time(const struct text *const text, const uint32_t *const words)
 {
     SAY(text,
-        "%s: plain cycles: smart-serial transfers may take %u us, but the DPLL's timer fires %u us behind the write; "
-        "set dpll.%02u.timer-us to more",
+        "%s: plain cycles: transfers of smart serial or SPI may take %u us, but the DPLL's timer fires %u us behind "
+        "the write; set dpll.%02u.timer-us to more",
         text->board->prefix, (unsigned)words[BOARD_PIPELINE_NEED_US], (unsigned)words[BOARD_PIPELINE_TIMER_US],
         text->board->pipeline.timer);
 }

@@ -141,16 +141,31 @@ int64_t board_pipeline_sample_ns(const struct hm2_board *const board)
     return board->request_ns + hm2_plan_facts(board->plan).waited_us * INT64_C(1000);
 }
 
-void board_pipeline_setup(struct hm2_board *const board)
+void board_pipeline_measure(struct hm2_board *const board)
 {
     struct board_pipeline *const p = &board->pipeline;
+    p->need_ns = 0;
     for (unsigned i = 0; i < board->module_count; i++) {
         const struct hm2_module *const module = &board->modules[i];
         const int64_t ns = module->type->turn_ns ? module->type->turn_ns(module) : 0;
         p->need_ns = ns > p->need_ns ? ns : p->need_ns;
     }
+}
+
+void board_pipeline_setup(struct hm2_board *const board)
+{
+    const struct board_pipeline *const p = &board->pipeline;
+    board_pipeline_measure(board);
     if (p->need_ns > 0)
         hm2_dpll_offer_timer_ns(hm2_board_module(board, HM2_GTAG_DPLL), p->timer, p->need_ns + JITTER_NS);
+}
+
+void board_pipeline_warn(const struct hm2_board *const board, struct hm2_diag *const diag)
+{
+    hm2_diag_warn(diag,
+                  "%s: config pipelined=%u has no effect: what a cycle writes and what it asks for do not fit into one "
+                  "datagram; use fewer module instances",
+                  board->prefix, board->pipeline.timer);
 }
 
 void board_pipeline_unpacked(struct hm2_board *const board)
@@ -168,6 +183,7 @@ void board_pipeline_unpacked(struct hm2_board *const board)
 void board_pipeline_lost(struct hm2_board *const board)
 {
     board->pipeline.level += LATE_LEVEL;
+    board->cycle.turned = true;
 }
 
 void board_pipeline_received(struct hm2_board *const board, const bool on_time)

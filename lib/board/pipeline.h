@@ -41,8 +41,12 @@ bool board_pipeline_turns(struct hm2_board *board, int64_t now_ns);
 uint16_t board_pipeline_timeout_us(const struct hm2_board *board);
 /* Plain cycles from now on, until there is room again. */
 void board_pipeline_stop(struct hm2_board *board);
-/* Once, when all modules are set up: the time they need becomes the timer's, unless it is longer. */
+/* Whenever modules have been set up or changed: how long their transfers take. */
+void board_pipeline_measure(struct hm2_board *board);
+/* The same at load: that becomes the timer's offset, unless it is longer. */
 void board_pipeline_setup(struct hm2_board *board);
+/* At load: the plan's turns are too long. */
+void board_pipeline_warn(const struct hm2_board *board, struct hm2_diag *diag);
 /* The same: the modules have unpacked the reply to a turn. */
 void board_pipeline_unpacked(struct hm2_board *board);
 /* The same: a good reply; when it answers a turn: was it there when read began? */

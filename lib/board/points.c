@@ -55,8 +55,7 @@ static const struct hm2_point pipeline_points[] = {
     L(data_age_us, "pipeline.data-age-us", HM2_FLOAT, HM2_PIN_OUT, 0, "us", "age of the inputs when they are read"),
     L(wait_us, "pipeline.wait-us", HM2_U32, HM2_PIN_OUT, 0, "us", "time that the card has waited for its timer"),
     L(late, "pipeline.late", HM2_U32, HM2_PIN_OUT, 0, "cycles", "replies that the read had to wait for"),
-    L(early, "pipeline.early", HM2_U32, HM2_PIN_OUT, 0, "cycles",
-      "replies that were read before smart-serial transfers were over"),
+    L(early, "pipeline.early", HM2_U32, HM2_PIN_OUT, 0, "cycles", "replies that were read before transfers were over"),
     L(falls, "pipeline.falls", HM2_U32, HM2_PIN_OUT, 0, "", "returns to plain cycles because replies were late"),
 };
 #define PIPELINE_POINTS (sizeof pipeline_points / sizeof pipeline_points[0])

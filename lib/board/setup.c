@@ -307,11 +307,6 @@ static void prepare_cycle(struct hm2_board *const board)
     }
 }
 
-static void warn_plain(const struct hm2_board *const board, const char *const reason, struct hm2_diag *const diag)
-{
-    hm2_diag_warn(diag, "%s: config pipelined=%u has no effect: %s", board->prefix, board->config.pipelined, reason);
-}
-
 static int lay_out(struct hm2_board *const board, struct hm2_diag *const diag)
 {
     const unsigned timer = board->config.pipelined;
@@ -322,10 +317,7 @@ static int lay_out(struct hm2_board *const board, struct hm2_diag *const diag)
     if (err == 0)
         err = hm2_plan_freeze(board->plan, diag);
     if (err == 0 && !hm2_plan_pipelines(board->plan))
-        warn_plain(board,
-                   "what a cycle writes and what it asks for do not fit into one datagram; use fewer module "
-                   "instances",
-                   diag);
+        board_pipeline_warn(board, diag);
     return err;
 }
 

@@ -34,14 +34,6 @@ static size_t write_room(const struct hm2_plan *const plan)
     return sizeof plan->turn - plan->request_len - PLAN_BEFORE_BYTES - PLAN_WAIT_BYTES;
 }
 
-static bool has_queue(const struct plan_list *const list)
-{
-    for (unsigned i = 0; i < list->count; i++)
-        if (list->at[i].queue)
-            return true;
-    return false;
-}
-
 static bool fits(const struct hm2_plan *const plan)
 {
     size_t longest = 0;
@@ -55,7 +47,7 @@ static bool fits(const struct hm2_plan *const plan)
 void plan_prepare_turn(struct hm2_plan *const plan)
 {
     static const uint16_t no_wait = 0;
-    plan->pipelines = plan->timer > 0 && fits(plan) && !has_queue(&plan->reads);
+    plan->pipelines = plan->timer > 0 && fits(plan);
     if (!plan->pipelines)
         return;
     const uint16_t wait = (uint16_t)(LBP16_TIMER_WAIT_1 + 2u * (plan->timer - 1u));

@@ -54,6 +54,7 @@ struct hm2_bspi {
     struct waiting waiting[WAITING];
     bool filled; /* the last write had frames, so a reply has their echoes */
     uint32_t short_cycles;
+    bool unfinished; /* the last reply was short */
     hm2_bspi_fn read_function, write_function;
     void *read_context, *write_context;
 };
@@ -222,7 +223,8 @@ uint32_t hm2_bspi_short_cycles(const struct hm2_bspi *const port)
 
 static void take_echoes(struct hm2_bspi *const port)
 {
-    if ((hm2_window_get(&port->received, 0) & COUNT_MASK) < port->echoes) {
+    port->unfinished = (hm2_window_get(&port->received, 0) & COUNT_MASK) < port->echoes;
+    if (port->unfinished) {
         port->short_cycles++;
         return;
     }
@@ -241,6 +243,46 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
         if (port->read_function)
             (void)port->read_function(port->read_context);
     }
+}
+
+#define FRAME_CLOCKS 64u /* besides its bits: delays of up to 16 clocks before and behind it, and a reserve */
+
+static double frame_clocks(const struct hm2_bspi *const port, const unsigned channel)
+{
+    const uint32_t d = hm2_section_get(&port->descriptors, HM2_BSPI_CHANNELS - 1u - channel);
+    return (double)((d & 0x1Fu) + 1u) * 2.0 * (double)((d >> D_DIVIDER & 0xFFu) + 1u) + FRAME_CLOCKS;
+}
+
+/* Of all frames, and of a word that is sent once between them. */
+static int64_t port_turn_ns(const struct hm2_bspi *const port)
+{
+    double clocks = 0.0, longest = 0.0;
+    for (unsigned i = 0; i < port->frames; i++) {
+        const double frame = frame_clocks(port, port->frame[i].channel);
+        clocks += frame;
+        longest = fmax(longest, frame);
+    }
+    return (int64_t)((clocks + longest) * 1e9 / port->clock_hz);
+}
+
+static int64_t turn_ns(const struct hm2_module *const module)
+{
+    const struct bspis *const ctx = module->context;
+    int64_t longest = 0;
+    for (unsigned unit = 0; ctx && unit < module->instances; unit++) {
+        const int64_t ns = port_turn_ns(&ctx->port[unit]);
+        longest = ns > longest ? ns : longest;
+    }
+    return longest;
+}
+
+static bool unfinished(const struct hm2_module *const module)
+{
+    const struct bspis *const ctx = module->context;
+    for (unsigned unit = 0; ctx && unit < module->instances; unit++)
+        if (ctx->port[unit].unfinished)
+            return true;
+    return false;
 }
 
 /* The packet that carried the frames did not arrive, so nothing came back. */
@@ -297,6 +339,8 @@ const struct hm2_module_type hm2_bspi_type = {
     .unpack = unpack,
     .pack = pack,
     .write_lost = write_lost,
+    .turn_ns = turn_ns,
+    .unfinished = unfinished,
     .output_name = output_name,
     .groups = groups,
 };

@@ -251,17 +251,19 @@ static void forget_sent(struct pktuart *const p)
 
 /* A frame of one write is in the card, or is not. Of a longer one a part may be missing: it is given up, and the card
  * cleared of it, or what follows would be sent in its place. */
-static void miss(struct hm2_serial *const port)
+static bool miss(struct hm2_serial *const port, const bool hold)
 {
     struct pktuart *const p = (struct pktuart *)port;
+    const bool held = hold && p->frame_bytes <= WRITE_BYTES;
     if (p->frame_bytes > WRITE_BYTES) {
         drop_parts(p, port->sent_bytes);
         p->spoilt = true;
-    } else {
+    } else if (!held) {
         queue_frame(p);
     }
     p->seen = FRAMES;
     pkt_rx_miss(&p->rx);
+    return held;
 }
 
 /* When it has sent the frames before, and the spoilt one if that is whole after all. */
@@ -324,6 +326,15 @@ static unsigned fetch(struct pktuart *const p, uint8_t *const bytes)
     return len;
 }
 
+/* The count goes with the last part of a frame. */
+static void aim(struct hm2_serial *const port, const unsigned bytes)
+{
+    struct pktuart *const p = (struct pktuart *)port;
+    const bool ends = bytes > 0 && p->given_bytes == p->frame_bytes;
+    queue_aim(&p->out, words_of(bytes));
+    hm2_put_le16(p->out_count.address, ends ? port->tx_reg[SERIAL_COUNT] : HM2_PLAN_NOWHERE);
+}
+
 static void send_frame(struct hm2_serial *const port)
 {
     struct pktuart *const p = (struct pktuart *)port;
@@ -333,13 +344,11 @@ static void send_frame(struct hm2_serial *const port)
         forget_sent(p);
     port->sent_bytes = tx_set_up(p) ? fetch(p, bytes) : 0;
     const unsigned words = words_of(port->sent_bytes);
-    queue_aim(&p->out, words);
+    aim(port, port->sent_bytes);
     for (unsigned n = 0; n < words; n++) {
         const struct queue_place at = queue_place(&p->out, words, n);
         hm2_window_set(at.window, at.word, hm2_get_le32(bytes + 4u * n));
     }
-    const bool ends = words > 0 && p->given_bytes == p->frame_bytes;
-    hm2_put_le16(p->out_count.address, ends ? port->tx_reg[SERIAL_COUNT] : HM2_PLAN_NOWHERE);
     hm2_window_set(&p->out_count, 0, p->frame_bytes);
 }
 
@@ -352,8 +361,14 @@ static void ask(struct hm2_serial *const port)
     pkt_rx_ask(&p->rx, port, set_up && !p->rx.clearing);
 }
 
-static const struct serial_ops ops = {
-    .open = open_port, .set = set_port, .take = take, .late = late, .miss = miss, .send = send_frame, .ask = ask};
+static const struct serial_ops ops = {.open = open_port,
+                                      .set = set_port,
+                                      .take = take,
+                                      .late = late,
+                                      .miss = miss,
+                                      .send = send_frame,
+                                      .aim = aim,
+                                      .ask = ask};
 
 static int setup(struct hm2_module *const module, struct hm2_setup *const setup)
 {

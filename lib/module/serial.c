@@ -108,6 +108,10 @@ int hm2_serial_set(struct hm2_serial *const port, const struct hm2_serial_settin
     if (settings->frames || port->settings.frames)
         serial_drop_frames(port);
     port->settings = *settings;
+    /* The transmitter is cleared: of what was on its way nobody knows how much it has sent. */
+    port->counts.tx_uncertain += port->sent_bytes;
+    port->sent_bytes = 0;
+    port->held = port->resend = false;
     return 0;
 }
 
@@ -230,6 +234,31 @@ static struct hm2_serial *open_port(const struct hm2_module *const module, const
     return port && port->open ? port : NULL;
 }
 
+/* The reply to the turn behind one that had none: are the bytes of that one in the card? This one had no bytes. */
+HM2_RARE static void take_held(struct hm2_serial *const port, const struct hm2_cycle *const cycle)
+{
+    const unsigned bytes = port->sent_bytes;
+    port->held = false;
+    port->sent_bytes = 0;
+    port->resend = cycle->turned && !cycle->before_kept;
+    port->ops->take(port);
+    if (port->resend)
+        port->sent_bytes = bytes;
+    else if (cycle->turned)
+        port->counts.tx_bytes += bytes;
+    else
+        port->counts.tx_uncertain += bytes;
+}
+
+static void take(struct hm2_serial *const port)
+{
+    if (!port->resend)
+        port->counts.tx_bytes += port->sent_bytes;
+    port->ops->take(port);
+    if (!port->resend)
+        port->sent_bytes = 0;
+}
+
 void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     for (unsigned unit = 0; unit < module->instances; unit++) {
@@ -239,11 +268,10 @@ void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *cons
         port->awaiting = false;
         port->sent_ns = cycle->now_ns;
         port->now_ns = cycle->received_ns;
-        if (!port->resend)
-            port->counts.tx_bytes += port->sent_bytes;
-        port->ops->take(port);
-        if (!port->resend)
-            port->sent_bytes = 0;
+        if (port->held)
+            take_held(port, cycle);
+        else
+            take(port);
         show_counts(port);
     }
 }
@@ -269,13 +297,27 @@ void serial_write_lost(struct hm2_module *const module)
     }
 }
 
-/* Nobody knows what the card sent. */
-static void miss(struct hm2_serial *const port)
+/* Nobody knows what the card sent; of a turn the next reply tells it, when that comes. */
+static void miss(struct hm2_serial *const port, const bool turned)
 {
-    port->counts.tx_uncertain += port->sent_bytes;
     port->resend = false;
-    port->ops->miss(port);
+    port->held = port->ops->miss(port, turned && !port->held && port->sent_bytes > 0);
+    if (port->held)
+        return;
+    port->counts.tx_uncertain += port->sent_bytes;
     port->sent_bytes = 0;
+}
+
+/* The words of the last write stay in it for the case that they have to be sent again. */
+static void send(struct hm2_serial *const port)
+{
+    if (port->held)
+        port->ops->aim(port, 0);
+    else if (port->resend)
+        port->ops->aim(port, port->sent_bytes);
+    else
+        port->ops->send(port);
+    port->resend = false;
 }
 
 void serial_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -286,10 +328,8 @@ void serial_pack(struct hm2_module *const module, const struct hm2_cycle *const 
             continue;
         port->now_ns = cycle->now_ns;
         if (port->awaiting)
-            miss(port);
-        if (!port->resend)
-            port->ops->send(port);
-        port->resend = false;
+            miss(port, cycle->turned);
+        send(port);
         port->ops->ask(port);
         port->awaiting = true;
         show_counts(port);

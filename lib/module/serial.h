@@ -88,6 +88,7 @@ struct hm2_serial {
     bool open;
     bool awaiting;           /* a write and a request with our words are on their way */
     bool resend;             /* the last write was lost: the same again */
+    bool held;               /* a turn had no reply: whether sent_bytes arrived is told by the next one */
     unsigned sent_bytes;     /* in the last write, until it is known to have arrived */
     int64_t sent_ns, now_ns; /* take: of the request, and of its reply; late and ask: now */
     struct hm2_serial_settings settings;
@@ -104,9 +105,12 @@ struct serial_ops {
     int (*set)(struct hm2_serial *port, const struct hm2_serial_settings *settings, struct hm2_diag *diag);
     void (*take)(struct hm2_serial *port);                   /* a fresh reply; what was sent is counted already */
     void (*late)(struct hm2_serial *port, uint64_t request); /* one that was given up */
-    void (*miss)(struct hm2_serial *port);                   /* no fresh reply since the last write, of sent_bytes */
-    void (*send)(struct hm2_serial *port);                   /* the next write, unless the last is sent again */
-    void (*ask)(struct hm2_serial *port);                    /* the next request */
+    /* No fresh reply since the last write. With hold its bytes, if it may, stay as they are until the next reply tells
+     * whether they arrived: true. */
+    bool (*miss)(struct hm2_serial *port, bool hold);
+    void (*send)(struct hm2_serial *port);                /* the next write, unless the last is sent again */
+    void (*aim)(struct hm2_serial *port, unsigned bytes); /* so many of the bytes in the write go to the FIFO */
+    void (*ask)(struct hm2_serial *port);                 /* the next request */
 };
 
 /* Checks what both kinds have in common. */

@@ -187,7 +187,7 @@ static void take_late(struct hm2_serial *const port, const uint64_t request)
 /* ---- write ----------------------------------------------------------------------------------------------------------
  */
 
-static void miss(struct hm2_serial *const port)
+static bool miss(struct hm2_serial *const port, const bool hold)
 {
     struct uart *const u = (struct uart *)port;
     if (u->asked.fours) {
@@ -197,6 +197,16 @@ static void miss(struct hm2_serial *const port)
     }
     u->asked = (struct asked){0};
     u->known = u->free_words = 0;
+    return hold;
+}
+
+static void aim(struct hm2_serial *const port, const unsigned bytes)
+{
+    struct uart *const u = (struct uart *)port;
+    const unsigned rest = bytes % 4u;
+    const unsigned tail = rest ? u->port.tx_reg[SERIAL_DATA] + SIZE_STRIDE * (rest - 1u) : HM2_PLAN_NOWHERE;
+    queue_aim(&u->out, bytes / 4u);
+    hm2_put_le16(u->tail.address, (uint16_t)tail);
 }
 
 static void send_bytes(struct hm2_serial *const port)
@@ -207,14 +217,12 @@ static void send_bytes(struct hm2_serial *const port)
         hm2_section_confirmed(&u->tx_rate) && hm2_section_confirmed(&u->tx_mode) && hm2_section_confirmed(&u->tx_clear);
     const unsigned words = u->free_words < WORDS ? u->free_words : WORDS;
     port->sent_bytes = ready ? (unsigned)ring_get(&u->port.tx, bytes, (size_t)4u * words) : 0;
-    const unsigned whole = port->sent_bytes / 4u, rest = port->sent_bytes % 4u;
-    queue_aim(&u->out, whole);
+    const unsigned whole = port->sent_bytes / 4u;
+    aim(port, port->sent_bytes);
     for (unsigned n = 0; n < whole; n++) {
         const struct queue_place at = queue_place(&u->out, whole, n);
         hm2_window_set(at.window, at.word, hm2_get_le32(bytes + 4u * n));
     }
-    const unsigned tail = rest ? u->port.tx_reg[SERIAL_DATA] + SIZE_STRIDE * (rest - 1u) : HM2_PLAN_NOWHERE;
-    hm2_put_le16(u->tail.address, (uint16_t)tail);
     hm2_window_set(&u->tail, 0, hm2_get_le32(bytes + 4u * whole));
 }
 
@@ -241,6 +249,7 @@ static const struct serial_ops ops = {.open = open_port,
                                       .late = take_late,
                                       .miss = miss,
                                       .send = send_bytes,
+                                      .aim = aim,
                                       .ask = ask_received};
 
 static int setup(struct hm2_module *const module, struct hm2_setup *const setup)

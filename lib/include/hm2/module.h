@@ -29,8 +29,8 @@ struct hm2_cycle {
     int64_t period_ns;   /* of the thread, > 0 */
     double period_s;
     double age_s;     /* unpack: what the inputs are older than this cycle; 0 unless pipelined */
-    bool turned;      /* unpack: the reply answers a turn (hm2_plan_turn()): it was read soon after our last write */
-    bool before_kept; /* then: as in struct hm2_plan_facts */
+    bool turned;      /* the last write was a turn (hm2_plan_turn()): its reply was read soon after the write */
+    bool before_kept; /* unpack: as in struct hm2_plan_facts */
     uint32_t writes;  /* write cycles since load or since the last restart; 0 = this is the first */
     bool bitten;      /* the card's watchdog has bitten and was not yet cleared: outputs are off */
     double undriven;  /* unpack: part (0..1) of the time since the last one in which outputs were off after a bite */
