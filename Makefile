@@ -59,7 +59,7 @@ BENCHES := $(sort $(patsubst tests/bench/%.c,%,$(wildcard tests/bench/bench_*.c)
 UNIT_HELPERS := $(sort $(filter-out tests/unit/test_%.c,$(wildcard tests/unit/*.c)))
 BENCH_HELPERS := $(sort $(filter-out tests/bench/bench_%.c,$(wildcard tests/bench/*.c)))
 SYSTEM_HELPERS := $(sort $(filter-out tests/system/check_%.c,$(wildcard tests/system/*.c)))
-ALL_SRC := $(LIB_SRC) $(SIM_SRC) $(HOST_SRC) $(sort $(wildcard tools/*/*.c components/*/*.c tests/*/*.c))
+ALL_SRC := $(LIB_SRC) $(SIM_SRC) $(HOST_SRC) $(sort $(wildcard tools/*/*.c components/*/*.c tests/*/*.c tests/system/*/*.c))
 MAN_PAGES = $(sort $(wildcard man/*.[0-9])) $(BUILDDIR)/man/hm2_lbp16.9
 
 # hm2host's prompt is better with libedit, and works without.
