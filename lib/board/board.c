@@ -143,9 +143,10 @@ int hm2_board_change_end(struct hm2_board *const board, struct hm2_diag *const d
     const int err = hm2_plan_freeze(board->plan, diag);
     if (err < 0 && board->state == BOARD_RUNS)
         board->state = BOARD_STOPPED;
-    if (board->pipeline.timer > 0)
-        board_pipeline_measure(board);
-    if (err == 0 && board->pipeline.timer > 0 && !hm2_plan_pipelines(board->plan))
+    if (board->pipeline.timer == 0)
+        return err;
+    board_pipeline_measure(board);
+    if (err == 0 && !hm2_plan_pipelines(board->plan))
         board_pipeline_warn(board, diag);
     return err;
 }

@@ -340,9 +340,10 @@ static void send_frame(struct hm2_serial *const port)
     struct pktuart *const p = (struct pktuart *)port;
     uint8_t bytes[WRITE_BYTES] = {0};
     clear_spoilt(p);
-    if (!tx_set_up(p))
+    const bool set_up = tx_set_up(p);
+    if (!set_up)
         forget_sent(p);
-    port->sent_bytes = tx_set_up(p) ? fetch(p, bytes) : 0;
+    port->sent_bytes = set_up ? fetch(p, bytes) : 0;
     const unsigned words = words_of(port->sent_bytes);
     aim(port, port->sent_bytes);
     for (unsigned n = 0; n < words; n++) {
