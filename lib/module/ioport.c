@@ -8,7 +8,7 @@
  *
  * Pins act in every cycle, as far as they can: the data of an input reach no pad, so `out` is read of pins only that
  * have been outputs, from the very write on that makes them so. Parameters cannot be linked to signals, only a person
- * sets them; a few I/Os are looked at in each cycle, and when one has changed, all of them.
+ * sets them; one I/O is looked at in each cycle, and when it has changed, all of them.
  */
 #include <stdio.h>
 
@@ -17,8 +17,6 @@
 #include "module_types.h"
 
 enum { REG_DATA, REG_DIRECTION, REG_ALT_SOURCE, REG_OPEN_DRAIN, REG_INVERT };
-
-#define LOOKS_PER_CYCLE 2u /* I/Os whose parameters are looked at in a cycle */
 
 struct gpio_out {
     hm2_bit_t *out;
@@ -311,16 +309,12 @@ HM2_RARE static void take_parameters(struct ioport *const ctx)
         apply(ctx, number);
 }
 
-/* Has one of the next few I/Os changed? */
+/* Has the I/O that is looked at next changed? */
 static bool parameters_changed(struct ioport *const ctx)
 {
-    unsigned changed = 0;
-    for (unsigned i = 0; i < LOOKS_PER_CYCLE; i++) {
-        const struct io_setup *const row = ctx->look;
-        changed |= (unsigned)look(row) ^ row->seen;
-        ctx->look = row + 1 < ctx->setups + ctx->setup_count ? row + 1 : ctx->setups;
-    }
-    return changed != 0;
+    const struct io_setup *const row = ctx->look;
+    ctx->look = row + 1 < ctx->setups + ctx->setup_count ? row + 1 : ctx->setups;
+    return look(row) != row->seen;
 }
 
 static uint32_t outputs(const struct port *const port)

@@ -12,8 +12,8 @@
 #define OPEN_DRAIN(port) (uint16_t)(0x1300 + 4 * (port))
 #define INVERT(port)     (uint16_t)(0x1400 + 4 * (port))
 
-/* Cycles in which every parameter is looked at and every level written once: at 3 ports of 17 bits. */
-#define ALL_TURNS 32u
+/* Cycles in which every level is written once, and every parameter looked at: at 3 ports of 17 bits, one a cycle. */
+#define ALL_TURNS 51u
 
 /* A module that owns pins like a real one, with or without names. */
 static int claim_deferred(struct hm2_module *module, struct hm2_setup *setup)
