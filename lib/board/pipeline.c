@@ -4,13 +4,14 @@
 #include "../module/dpll.h"
 #include "board_private.h"
 
-/* Replies late or lost, each worth LATE_LEVEL, may not come more often than one in LATE_LEVEL; four in a row are too
- * many at any rate. */
+/* Replies late or lost, each worth LATE_LEVEL, may not come more often than one in LATE_LEVEL for long. A pause of the
+ * host, the network or the card of some 25 ms, in which each is late, is no reason for plain cycles: they lose more of
+ * them. */
 #define LATE_LEVEL  16u
-#define LEVEL_LIMIT 64u
+#define LEVEL_LIMIT 512u
 
 #define RTT_KNOWN       256u           /* replies */
-#define RTT_ABOVE       8u             /* of 1024 may take longer than the bound */
+#define RTT_ABOVE       32u            /* of 1024 may take longer than the bound */
 #define DPLL_STARTS     110u           /* writes, in the first hundred of which the loop is held */
 #define LOOK_EVERY      16u            /* cycles */
 #define GUARD_PER_MILLE 50             /* of the period */

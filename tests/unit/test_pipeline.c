@@ -275,7 +275,7 @@ static void without_margin_it_falls_back_says_so_and_returns(void **state)
     load_and_lock(f);
     servo_faults(f, &(struct sim_faults){.seed = 1, .delay_min_ns = 350000, .delay_max_ns = 350000});
     f->work_ns = 250000;
-    servo_cycles(f, 12);
+    servo_cycles(f, 40);
     assert_true(servo_get(f, "pipeline.active") == 0);
     assert_true(servo_get(f, "pipeline.falls") == 1);
     assert_true(servo_message(f, "plain cycles again"));

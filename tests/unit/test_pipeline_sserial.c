@@ -330,26 +330,52 @@ static void without_margin_plain_cycles_go_on_where_turns_have_ended(void **stat
     no_failures(f);
 }
 
-/* With losses before, at and behind the cycle in which turns end. */
+static const struct sim_faults all_late = {.seed = 1, .delay_min_ns = 300000, .delay_max_ns = 300000};
+
+static void delay_all(struct servo_rig *const f)
+{
+    servo_faults(f, &all_late);
+    f->work_ns = 250000;
+}
+
+static unsigned cycles_to_the_last_turn(struct numbers *const n)
+{
+    unsigned cycles = 0;
+    delay_all(n->rig);
+    for (; cycles < 100 && servo_get(n->rig, "pipeline.active") == 1; cycles++)
+        go_on(n);
+    return cycles;
+}
+
+/* Before, at and behind the cycle in which turns end, the datagram to the card or from it. */
 static void where_turns_end_losses_cost_no_more_than_elsewhere(void **state)
 {
-    struct servo_rig *const f = *state;
-    struct numbers n = running(f);
-    for (unsigned seed = 0; seed < 4; seed++) {
-        servo_faults(f, &(struct sim_faults){.seed = seed, .loss = 0.4});
-        for (unsigned i = 0; i < 100 && servo_get(f, "pipeline.active") == 1; i++)
+    struct numbers n = running(*state);
+    const unsigned last = cycles_to_the_last_turn(&n);
+    assert_in_range(last, 20, 50);
+    for (unsigned i = 0; i < 8; i++) {
+        assert_int_equal(servo_tear_down(state), 0);
+        assert_int_equal(set_up(state), 0);
+        struct servo_rig *const f = *state;
+        n = running(f);
+        delay_all(f);
+        for (unsigned before = 0; before < last - 2u + i / 2u; before++)
             go_on(&n);
+        const struct sim_faults loss = {.seed = 1, .loss = 1.0};
+        if (i % 2 == 0)
+            servo_faults(f, &loss);
+        else
+            servo_spoil_next_reply(f, &loss);
+        go_on(&n);
+        (void)cycles_to_the_last_turn(&n);
         assert_true(servo_get(f, "pipeline.active") == 0);
-        for (unsigned i = 0; i < seed; i++)
-            go_on(&n);
         servo_no_faults(f);
-        for (unsigned i = 0; i < 3; i++)
+        f->work_ns = WORK_NS;
+        for (unsigned more = 0; more < 3; more++)
             go_on(&n);
-        rounds(&n, 5);
-        no_failures(f);
-        for (unsigned i = 0; i < 10000 && servo_get(f, "pipeline.active") == 0; i++)
-            rounds(&n, 1);
+        rounds(&n, 1200);
         assert_true(servo_get(f, "pipeline.active") == 1);
+        no_failures(f);
     }
 }
 
