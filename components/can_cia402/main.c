@@ -17,6 +17,7 @@
 #include <hm2/nmt.h>
 #include <hm2/points.h>
 
+#include "common/component.h"
 #include "common/hal_binder.h"
 
 MODULE_AUTHOR("libhm2 developers");
@@ -208,24 +209,16 @@ static int create(void)
     return hal_export_funct("cia402.update", update, NULL, 1, 0, component_id);
 }
 
+void rtapi_app_exit(void)
+{
+    hal_exit(component_id);
+}
+
 int rtapi_app_main(void)
 {
     if (count < 1 || count > MAX_DRIVES) {
         rtapi_print_msg(RTAPI_MSG_ERR, "can_cia402: count=%d: give 1 to %d drives\n", count, MAX_DRIVES);
         return -EINVAL;
     }
-    component_id = hal_init("can_cia402");
-    if (component_id < 0)
-        return component_id;
-    int result = create();
-    if (result == 0)
-        result = hal_ready(component_id);
-    if (result < 0)
-        hal_exit(component_id);
-    return result;
-}
-
-void rtapi_app_exit(void)
-{
-    hal_exit(component_id);
+    return component_load("can_cia402", &component_id, create, rtapi_app_exit);
 }

@@ -23,6 +23,7 @@
 
 #include <hm2/can.h>
 
+#include "common/component.h"
 #include "common/hal_binder.h"
 #include "common/messenger.h"
 #include "controller.h"
@@ -311,7 +312,7 @@ static int load_buses(void)
     return result;
 }
 
-static void unload(void)
+void rtapi_app_exit(void)
 {
     close_functions();
     messenger_stop();
@@ -323,24 +324,15 @@ static void unload(void)
     bus_count = 0;
 }
 
-int rtapi_app_main(void)
+static int load(void)
 {
-    component_id = hal_init("can_io");
-    if (component_id < 0)
-        return component_id;
     hal_binder_init(&hal, component_id);
     atomic_store(&closing, false);
-    int result = load_buses();
-    if (result == 0)
-        result = messenger_start("can_io", supervise, SUPERVISE_NS);
-    if (result == 0)
-        result = hal_ready(component_id);
-    if (result < 0)
-        unload();
-    return result;
+    const int result = load_buses();
+    return result ? result : messenger_start("can_io", supervise, SUPERVISE_NS);
 }
 
-void rtapi_app_exit(void)
+int rtapi_app_main(void)
 {
-    unload();
+    return component_load("can_io", &component_id, load, rtapi_app_exit);
 }

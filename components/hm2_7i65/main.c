@@ -18,6 +18,7 @@
 
 #include <hm2/points.h>
 
+#include "common/component.h"
 #include "common/hal_binder.h"
 
 MODULE_AUTHOR("libhm2 developers");
@@ -224,11 +225,8 @@ static void forget_cards(const unsigned count)
 
 static unsigned card_count;
 
-int rtapi_app_main(void)
+static int load(void)
 {
-    component_id = hal_init("hm2_7i65");
-    if (component_id < 0)
-        return component_id;
     hal_binder_init(&hal, component_id);
     int result = bspi_chans[0] && bspi_chans[0][0] ? 0 : -EINVAL;
     if (result)
@@ -236,12 +234,6 @@ int rtapi_app_main(void)
     for (card_count = 0; !result && card_count < MAX_CARDS && bspi_chans[card_count] && bspi_chans[card_count][0];
          card_count++)
         result = load_card(card_count);
-    if (result == 0)
-        result = hal_ready(component_id);
-    if (result < 0) {
-        forget_cards(card_count);
-        hal_exit(component_id);
-    }
     return result;
 }
 
@@ -249,4 +241,9 @@ void rtapi_app_exit(void)
 {
     forget_cards(card_count);
     hal_exit(component_id);
+}
+
+int rtapi_app_main(void)
+{
+    return component_load("hm2_7i65", &component_id, load, rtapi_app_exit);
 }

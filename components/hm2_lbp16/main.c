@@ -22,6 +22,7 @@
 #include <hm2/link.h>
 
 #include "cards.h"
+#include "common/component.h"
 #include "common/hal_binder.h"
 #include "common/messenger.h"
 #include "exports.h"
@@ -512,7 +513,7 @@ static int load_cards(void)
 }
 
 /* Outputs go to their safe state before the memory that HAL's functions use goes away. */
-static void unload_cards(void)
+void rtapi_app_exit(void)
 {
     close_functions();
     for (unsigned i = 0; i < card_count; i++)
@@ -526,24 +527,15 @@ static void unload_cards(void)
     card_count = 0;
 }
 
-int rtapi_app_main(void)
+static int load(void)
 {
-    component_id = hal_init("hm2_lbp16");
-    if (component_id < 0)
-        return component_id;
     hal_binder_init(&hal, component_id);
     atomic_store(&closing, false);
-    int result = load_cards();
-    if (result == 0)
-        result = messenger_start("hm2_lbp16", look_after_cards, MESSENGER_PRINTS_NS);
-    if (result == 0)
-        result = hal_ready(component_id);
-    if (result < 0)
-        unload_cards();
-    return result;
+    const int result = load_cards();
+    return result ? result : messenger_start("hm2_lbp16", look_after_cards, MESSENGER_PRINTS_NS);
 }
 
-void rtapi_app_exit(void)
+int rtapi_app_main(void)
 {
-    unload_cards();
+    return component_load("hm2_lbp16", &component_id, load, rtapi_app_exit);
 }

@@ -22,6 +22,7 @@
 #include <hm2/points.h>
 #include <hm2/serial.h>
 
+#include "common/component.h"
 #include "common/hal_binder.h"
 #include "common/messenger.h"
 #include "speed.h"
@@ -247,7 +248,7 @@ static int load_terminal(const unsigned i)
     return result;
 }
 
-static void unload(void)
+void rtapi_app_exit(void)
 {
     messenger_stop();
     for (unsigned i = 0; i < count; i++) {
@@ -262,27 +263,18 @@ static void unload(void)
     count = 0;
 }
 
-int rtapi_app_main(void)
+static int load(void)
 {
-    component_id = hal_init("hm2_pty");
-    if (component_id < 0)
-        return component_id;
     hal_binder_init(&hal, component_id);
     int result = ports[0] && ports[0][0] ? 0 : -EINVAL;
     if (result)
         rtapi_print_msg(RTAPI_MSG_ERR, "hm2_pty: no port given: loadrt hm2_pty ports=hm2_7i80.0.pktuart.0\n");
     for (unsigned i = 0; !result && i < MAX_PORTS && ports[i] && ports[i][0]; i++)
         result = load_terminal(i);
-    if (!result)
-        result = messenger_start("hm2_pty", carry, CARRY_NS);
-    if (!result)
-        result = hal_ready(component_id);
-    if (result < 0)
-        unload();
-    return result;
+    return result ? result : messenger_start("hm2_pty", carry, CARRY_NS);
 }
 
-void rtapi_app_exit(void)
+int rtapi_app_main(void)
 {
-    unload();
+    return component_load("hm2_pty", &component_id, load, rtapi_app_exit);
 }

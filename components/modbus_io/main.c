@@ -14,6 +14,7 @@
 #include <rtapi.h>
 #include <rtapi_app.h>
 
+#include "common/component.h"
 #include "common/hal_binder.h"
 #include "modbus_io/instance.h"
 
@@ -53,7 +54,7 @@ static int load(const char *const path)
     return result ? result : export(instance);
 }
 
-static void unload(void)
+void rtapi_app_exit(void)
 {
     hal_exit(component_id);
     for (unsigned i = 0; i < count; i++)
@@ -61,25 +62,18 @@ static void unload(void)
     count = 0;
 }
 
-int rtapi_app_main(void)
+static int load_all(void)
 {
-    component_id = hal_init("modbus_io");
-    if (component_id < 0)
-        return component_id;
     hal_binder_init(&hal, component_id);
     int result = config[0] && config[0][0] ? 0 : -EINVAL;
     if (result)
         rtapi_print_msg(RTAPI_MSG_ERR, "modbus_io: no file given: loadrt modbus_io config=FILE\n");
     for (unsigned i = 0; !result && i < MAX_INSTANCES && config[i] && config[i][0]; i++)
         result = load(config[i]);
-    if (!result)
-        result = hal_ready(component_id);
-    if (result < 0)
-        unload();
     return result;
 }
 
-void rtapi_app_exit(void)
+int rtapi_app_main(void)
 {
-    unload();
+    return component_load("modbus_io", &component_id, load_all, rtapi_app_exit);
 }

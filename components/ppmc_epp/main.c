@@ -16,6 +16,7 @@
 
 #include <hm2/ppmc.h>
 
+#include "common/component.h"
 #include "common/hal_binder.h"
 #include "common/messenger.h"
 
@@ -263,7 +264,7 @@ static int load_buses(void)
     return result;
 }
 
-static void unload_buses(void)
+void rtapi_app_exit(void)
 {
     close_functions();
     messenger_stop();
@@ -276,24 +277,15 @@ static void unload_buses(void)
     bus_count = 0;
 }
 
-int rtapi_app_main(void)
+static int load(void)
 {
-    component_id = hal_init("ppmc_epp");
-    if (component_id < 0)
-        return component_id;
     hal_binder_init(&hal, component_id);
     atomic_store(&closing, false);
-    int result = load_buses();
-    if (result == 0)
-        result = messenger_start("ppmc_epp", print_messages, MESSENGER_PRINTS_NS);
-    if (result == 0)
-        result = hal_ready(component_id);
-    if (result < 0)
-        unload_buses();
-    return result;
+    const int result = load_buses();
+    return result ? result : messenger_start("ppmc_epp", print_messages, MESSENGER_PRINTS_NS);
 }
 
-void rtapi_app_exit(void)
+int rtapi_app_main(void)
 {
-    unload_buses();
+    return component_load("ppmc_epp", &component_id, load, rtapi_app_exit);
 }

@@ -16,6 +16,7 @@
 #include <hm2/points.h>
 #include <hm2/scurve.h>
 
+#include "common/component.h"
 #include "common/hal_binder.h"
 
 MODULE_AUTHOR("libhm2 developers");
@@ -116,24 +117,16 @@ static int create(void)
     return hal_export_funct("scurve.update", update, NULL, 1, 0, component_id);
 }
 
+void rtapi_app_exit(void)
+{
+    hal_exit(component_id);
+}
+
 int rtapi_app_main(void)
 {
     if (count < 1 || count > MAX_AXES) {
         rtapi_print_msg(RTAPI_MSG_ERR, "scurve: count=%d: give 1 to %d axes\n", count, MAX_AXES);
         return -EINVAL;
     }
-    component_id = hal_init("scurve");
-    if (component_id < 0)
-        return component_id;
-    int result = create();
-    if (result == 0)
-        result = hal_ready(component_id);
-    if (result < 0)
-        hal_exit(component_id);
-    return result;
-}
-
-void rtapi_app_exit(void)
-{
-    hal_exit(component_id);
+    return component_load("scurve", &component_id, create, rtapi_app_exit);
 }

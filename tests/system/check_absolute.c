@@ -2,10 +2,10 @@
 /* Absolute encoders of hm2sim, as the component hm2_lbp16 shows them in hm2host. */
 #include <check.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "simulator.h"
+#include "suite.h"
 #include "talk.h"
 
 #define IMAGE      TEST_DATA "/firmware/absolute_48.hex"
@@ -113,9 +113,5 @@ int main(void)
     tcase_add_test(tests, an_encoder_turns_by_itself);
     tcase_add_test(tests, an_encoder_turns_with_a_step_generator);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return run_suite(suite);
 }

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define LIMIT_S  "500"
 #define LIMIT_MS 560000
@@ -85,9 +86,5 @@ int main(void)
     tcase_add_loop_test(tests, on_a_kernel_with_can, 0, CASES);
     tcase_add_test(tests, no_case_is_forgotten);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

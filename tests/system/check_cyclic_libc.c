@@ -22,6 +22,7 @@
 
 #include "libc/watch.h"
 #include "process.h"
+#include "suite.h"
 
 /* ---- the card, in a thread of its own -----------------------------------------------------------------------------
  */
@@ -363,9 +364,5 @@ int main(void)
     tcase_add_loop_test(tests, no_cycle_allocates_locks_or_formats_whatever_happens, 0,
                         (int)(sizeof profiles / sizeof profiles[0]));
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define READY_MS     10000
 #define WARM_UP      300 /* cycles: the DPLL sends its set-up for a while */
@@ -327,9 +328,5 @@ int main(void)
     tcase_add_test(tests, a_bad_network_costs_receives_and_nothing_else);
     tcase_add_test(tests, a_pipelined_cycle_is_one_receive_and_one_send);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

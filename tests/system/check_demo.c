@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define DEMO_MS   180000
 #define START_MS  120000
@@ -418,9 +419,5 @@ int main(void)
     tcase_add_loop_test(reports, lost_packets_and_damaged_files_fail_the_demo, 0, COUNT(damaged));
     tcase_add_loop_test(reports, a_missing_file_fails_the_demo, 0, 4);
     suite_add_tcase(suite, reports);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

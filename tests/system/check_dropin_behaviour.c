@@ -17,6 +17,7 @@
 
 #include "dropin/scenario.h"
 #include "dropin_table.h"
+#include "suite.h"
 
 #define MAX_POINTS 1000u
 #define MAX_CYCLES 4000u
@@ -420,9 +421,5 @@ int main(void)
     tcase_add_test(tests, every_module_of_linuxcncs_driver_is_compared_or_it_is_explained_why_not);
     tcase_add_test(tests, no_row_of_the_table_is_stale);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

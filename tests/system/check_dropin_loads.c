@@ -17,6 +17,7 @@
 #include "dropin/driver.h"
 #include "dropin_table.h"
 #include "process.h"
+#include "suite.h"
 
 #define MAX_POINTS 800u
 #define MESSAGES   65536u
@@ -352,9 +353,5 @@ int main(void)
     tcase_add_test(tests, every_module_parameter_of_linuxcncs_driver_is_one_of_ours);
     tcase_add_loop_test(tests, a_module_parameter_is_used_or_told_to_have_no_effect, 0, (int)PARAMETERS);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -19,6 +19,7 @@
 #include "dropin_table.h"
 #include "linuxcnc_peer.h"
 #include "process.h"
+#include "suite.h"
 
 #define PEER_LIMIT_MS 300000 /* for all tries that linuxcnc-peer makes */
 
@@ -361,9 +362,5 @@ int main(void)
                         (int)LOADS);
     tcase_add_test(tests, no_row_of_the_table_is_stale);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -26,6 +26,7 @@
 #include "halhost.h"
 #include "process.h"
 #include "state.h"
+#include "suite.h"
 
 #define BASE       0x378u
 #define THEIRS     "/usr/lib/linuxcnc/modules/hal_ppmc.so"
@@ -375,9 +376,5 @@ int main(void)
     tcase_set_timeout(tests, 60);
     tcase_add_test(tests, every_encoder_object_of_hal_ppmc_exists_and_counts_alike);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

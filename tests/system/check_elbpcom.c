@@ -11,6 +11,7 @@
 
 #include "process.h"
 #include "simulator.h"
+#include "suite.h"
 
 #define END_MS   20000
 #define REPLY_MS 10000
@@ -183,9 +184,5 @@ int main(void)
                         (int)(sizeof mistakes / sizeof mistakes[0]));
     tcase_add_test(tests, wrong_options_are_refused);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "flash_rig.h"
+#include "suite.h"
 
 #define MAX_LINES 700u
 
@@ -369,9 +370,5 @@ int main(void)
     tcase_add_test(tests, backups_are_the_same_and_each_restores_the_others);
     tcase_add_test(tests, a_wrong_image_is_refused_before_the_first_erase);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

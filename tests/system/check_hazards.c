@@ -3,8 +3,9 @@
  * runs it. */
 #include <check.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+
+#include "suite.h"
 
 #define FILE_BYTES 100000u
 
@@ -120,9 +121,5 @@ int main(void)
     tcase_add_loop_test(tests, every_hazard_has_a_test, 0, (int)PAGES);
     tcase_add_test(tests, everything_else_has_a_test);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0 ? EXIT_FAILURE : EXIT_SUCCESS;
+    return run_suite(suite);
 }

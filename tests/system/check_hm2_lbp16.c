@@ -13,6 +13,7 @@
 
 #include "relay.h"
 #include "simulator.h"
+#include "suite.h"
 #include "talk.h"
 
 #define COUNT(array) ((int)(sizeof(array) / sizeof((array)[0])))
@@ -809,9 +810,5 @@ int main(void)
     tcase_add_test(tests, a_power_cycle_beyond_the_limit_needs_io_error_cleared_too);
     tcase_add_test(tests, a_frozen_card_does_not_stop_the_other);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

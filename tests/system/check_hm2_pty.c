@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "simulator.h"
+#include "suite.h"
 #include "talk.h"
 
 /* How much goes round; with HM2_PTY_BYTES in the environment so much instead, which takes a minute for each 600 kB at
@@ -229,9 +230,5 @@ int main(void)
     tcase_add_test(tests, the_port_follows_the_speed_that_a_program_sets);
     tcase_add_test(tests, a_port_that_is_not_there_is_refused);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define END_MS 20000
 #define GOLDEN TEST_DATA "/can/golden.dbc"
@@ -99,9 +100,5 @@ int main(void)
     tcase_add_test(tests, json_is_json);
     tcase_add_test(tests, what_is_wrong_is_told_with_its_line);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "simulator.h"
+#include "suite.h"
 
 #define RUN_MS     30000
 #define TUNED      TEST_DATA "/doctor/tuned"
@@ -282,9 +283,5 @@ int main(void)
                         (int)(sizeof networks / sizeof networks[0]));
     tcase_add_test(tests, a_card_that_does_not_answer_is_a_fault);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -5,7 +5,6 @@
 #include <pty.h>
 #include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -17,6 +16,7 @@
 #include "flash_rig.h"
 #include "process.h"
 #include "simulator.h"
+#include "suite.h"
 
 #define RUN_MS   30000
 #define MAX_ARGS 20
@@ -626,9 +626,5 @@ int main(void)
     tcase_add_test(tests, works_on_many_cards_and_finds_them);
     tcase_add_test(tests, goes_by_the_name_of_mesaflash_too);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return run_suite(suite);
 }

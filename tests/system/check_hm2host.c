@@ -19,6 +19,7 @@
 #include <linux/capability.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define LINUXCNC_MODULES "/usr/lib/linuxcnc/modules"
 #define LINUXCNC_HEADERS "/usr/include/linuxcnc"
@@ -751,9 +752,5 @@ int main(void)
     tcase_add_test(tests, show_and_save_print_what_halcmd_prints);
     tcase_add_test(tests, a_component_built_with_linuxcncs_headers_loads);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

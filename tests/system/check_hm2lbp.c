@@ -14,6 +14,7 @@
 
 #include "process.h"
 #include "simulator.h"
+#include "suite.h"
 
 #define END_MS      20000
 #define MAX_ARGS    16
@@ -366,9 +367,5 @@ int main(void)
     tcase_add_loop_test(tests, mistakes_are_told, 0, (int)(sizeof mistakes / sizeof mistakes[0]));
     tcase_add_test(tests, another_protocol_in_the_environment_is_refused);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

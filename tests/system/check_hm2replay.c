@@ -8,6 +8,7 @@
 
 #include "process.h"
 #include "replay_trace.h"
+#include "suite.h"
 
 #define END_MS 60000
 
@@ -136,9 +137,5 @@ int main(void)
     tcase_add_test(tests, a_broken_table_is_refused_with_its_line);
     tcase_add_test(tests, one_test_can_be_chosen);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return run_suite(suite);
 }

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define READY_MS    10000
 #define END_MS      5000
@@ -717,9 +718,5 @@ int main(void)
     tcase_add_test(tests, mesaflash_reads_and_writes_a_7i96s);
     tcase_add_test(tests, mesaflash_reads_and_writes_a_7i93);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "flash_rig.h"
+#include "suite.h"
 
 #define END_MS     5000
 #define USER       0x100000u
@@ -162,9 +163,5 @@ int main(void)
     tcase_add_test(tests, wrong_options_are_refused_with_what_is_right);
     tcase_add_test(tests, two_simulators_do_not_share_a_file);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "simulator.h"
+#include "suite.h"
 #include "talk.h"
 
 #define RUN_MS 20000
@@ -113,9 +114,5 @@ int main(void)
     tcase_add_test(tests, what_is_no_recording_is_refused);
     tcase_add_test(tests, impossible_recorders_are_refused_at_load);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define BUILD_MS 600000
 #define USE_MS   60000
@@ -186,9 +187,5 @@ int main(void)
     tcase_add_test(tests, configure_says_where_the_installation_goes);
     tcase_add_test(tests, uninstalling_leaves_no_file);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

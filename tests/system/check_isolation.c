@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define LIMIT_MS   60000
 #define CANNOT_RUN 77
@@ -64,9 +65,5 @@ int main(void)
     tcase_add_loop_test(tests, a_cards_network_is_closed_to_others_where_that_is_right_and_opened_at_the_end, 0,
                         (int)(sizeof cases / sizeof cases[0]));
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

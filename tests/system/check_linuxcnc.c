@@ -16,6 +16,7 @@
 
 #include "linuxcnc_peer.h"
 #include "simulator.h"
+#include "suite.h"
 
 #define PEER_LIMIT_MS 110000
 #define MAX_SAMPLES   30000u
@@ -322,9 +323,5 @@ int main(void)
                         (int)(sizeof ours / sizeof ours[0]));
     tcase_add_test(tests, a_run_that_is_killed_leaves_nothing_behind);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -12,6 +12,7 @@
 
 #include "linuxcnc_peer.h"
 #include "process.h"
+#include "suite.h"
 
 #define LIMIT_MS 130000
 #define ERROR    "0.01" /* 10 counts of 1000 a unit */
@@ -56,9 +57,5 @@ int main(void)
     tcase_set_timeout(tests, LIMIT_MS / 1000.0 + 20);
     tcase_add_test(tests, two_loops_close_over_analog_outputs_and_multiplexed_encoders);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

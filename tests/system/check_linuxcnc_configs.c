@@ -15,6 +15,7 @@
 
 #include "linuxcnc_peer.h"
 #include "process.h"
+#include "suite.h"
 
 #define LIMIT_MS        100000
 #define JOINTS          3u
@@ -257,9 +258,5 @@ int main(void)
     tcase_add_loop_test(tests, a_configuration_of_others_homes_and_ends_where_its_program_says, 0,
                         (int)(sizeof configs / sizeof configs[0]));
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -11,6 +11,7 @@
 
 #include "linuxcnc_peer.h"
 #include "process.h"
+#include "suite.h"
 
 #define LIMIT_MS 130000
 #define OUT      TEST_BUILD "/linuxcnc-frames"
@@ -64,9 +65,5 @@ int main(void)
     tcase_set_timeout(tests, 2 * LIMIT_MS / 1000.0);
     tcase_add_test(tests, a_component_made_for_linuxcncs_driver_sends_and_receives_frames);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -15,6 +15,7 @@
 
 #include "linuxcnc_peer.h"
 #include "process.h"
+#include "suite.h"
 
 #define RUN_LIMIT_MS  240000
 #define LOAD_LIMIT_MS 100000
@@ -334,9 +335,5 @@ int main(void)
     tcase_add_test(tests, what_only_2_9_allows_is_refused);
     tcase_add_test(tests, every_module_loads_into_linuxcnc_as_an_ordinary_user_and_unloads_and_loads_again);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -8,6 +8,7 @@
 
 #include "linuxcnc_peer.h"
 #include "process.h"
+#include "suite.h"
 
 #define LIMIT_MS 130000
 
@@ -43,9 +44,5 @@ int main(void)
     tcase_set_timeout(tests, 140);
     tcase_add_test(tests, a_terminal_of_the_card_echoes);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

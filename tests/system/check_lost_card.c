@@ -11,6 +11,7 @@
 
 #include "linuxcnc_peer.h"
 #include "process.h"
+#include "suite.h"
 
 #define LIMIT_MS 1200000
 
@@ -42,9 +43,5 @@ int main(void)
     tcase_set_timeout(tests, 1250);
     tcase_add_test(tests, a_lost_card_comes_back_without_a_restart);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

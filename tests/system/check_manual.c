@@ -14,6 +14,7 @@
 #include <hm2/config.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define END_MS    20000
 #define NAMES     512
@@ -404,9 +405,5 @@ int main(void)
     tcase_add_test(tests, every_component_has_a_page);
     tcase_add_test(tests, references_among_our_pages_lead_somewhere);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -31,6 +31,7 @@
 #include "../../components/modbus_io/instance.h"
 #include "libc/watch.h"
 #include "process.h"
+#include "suite.h"
 
 #define PORT      1502
 #define TABLE     32
@@ -398,9 +399,5 @@ int main(void)
     tcase_add_test(tests, rts_is_raised_for_each_request);
     tcase_add_test(tests, a_port_without_modem_lines_works_with_rts_as_well);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -23,6 +23,7 @@
 #include <modbus/modbus.h>
 
 #include "mb2hal_peer.h"
+#include "suite.h"
 #include "talk.h"
 
 #define UNIT     17
@@ -711,9 +712,5 @@ int main(void)
     tcase_add_test(tests, modbus_io_in_linuxcnc_has_mb2hals_pins_and_writes_the_same);
     tcase_add_test(tests, a_server_of_pymodbus_gives_back_what_is_written);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -13,6 +13,7 @@
 
 #include "mb2hal_peer.h"
 #include "serial_pair.h"
+#include "suite.h"
 #include "talk.h"
 
 #define LIMIT_MS 30000
@@ -263,9 +264,5 @@ int main(void)
     tcase_add_test(tests, an_exception_of_pymodbus_counts_for_its_transaction_alone);
     tcase_add_test(tests, a_device_that_dies_in_a_transaction_and_comes_back_gets_its_outputs_again);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "suite.h"
 #include "talk.h"
 
 #define ROWS 20000
@@ -289,9 +290,5 @@ int main(void)
     tcase_add_test(tests, a_signal_does_not_move_the_axis);
     tcase_add_loop_test(tests, the_order_of_unloading_does_not_matter, 0, COUNT(orders));
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

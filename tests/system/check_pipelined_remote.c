@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "simulator.h"
+#include "suite.h"
 #include "talk.h"
 
 #define CARD     "hm2_7i96s.0"
@@ -144,9 +145,5 @@ int main(void)
     tcase_set_timeout(tests, 240);
     tcase_add_test(tests, a_7i77_shows_the_same_in_pipelined_and_in_plain_cycles);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -18,6 +18,7 @@
 #include "linuxcnc_peer.h"
 #include "process.h"
 #include "simulator.h"
+#include "suite.h"
 
 #define READY_MS   20000
 #define END_MS     20000
@@ -582,9 +583,5 @@ int main(void)
     tcase_set_timeout(steps, 120);
     tcase_add_test(steps, encoders_count_the_steps_of_a_simulated_card);
     suite_add_tcase(suite, steps);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -20,6 +20,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define READY_MS   20000
 #define END_MS     60000
@@ -382,9 +383,5 @@ int main(void)
     tcase_add_test(tests, the_commands_for_building_build_and_install);
     tcase_add_test(tests, autoconf_makes_a_configure_that_writes_config_mk);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

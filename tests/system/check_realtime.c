@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "process.h"
+#include "suite.h"
 
 #define RUN_MS 60000
 #define SKIP   77
@@ -73,9 +74,5 @@ int main(void)
     tcase_add_test(tests, a_duration_that_is_no_number_is_refused);
     tcase_add_test(tests, without_qemu_it_is_skipped_with_the_reason);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

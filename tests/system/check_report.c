@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "flash_rig.h"
+#include "suite.h"
 
 #define BROWSER_MS 120000
 
@@ -171,9 +172,5 @@ int main(void)
     tcase_add_test(tests, the_page_needs_nothing_beside_itself_and_can_be_drawn);
     tcase_add_test(tests, a_page_that_cannot_be_written_is_an_error_and_leaves_nothing);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

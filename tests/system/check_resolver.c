@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "simulator.h"
+#include "suite.h"
 #include "talk.h"
 
 #define CARD    "hm2_7i93.0"
@@ -83,9 +84,5 @@ int main(void)
     tcase_add_test(tests, resolvers_are_read_and_missing_ones_are_errors);
     tcase_add_test(tests, a_motor_goes_where_it_is_told_by_its_resolver);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return run_suite(suite);
 }

@@ -15,6 +15,7 @@
 
 #include "linuxcnc_peer.h"
 #include "simulator.h"
+#include "suite.h"
 
 #define MESA_TRIES  10u
 #define MESA_MS     20000
@@ -348,9 +349,5 @@ int main(void)
     tcase_add_loop_test(tests, linuxcncs_own_driver_makes_the_pins_of_each_mode, 1, 4);
     tcase_add_loop_test(tests, six_loops_close_over_analog_outputs_and_muxed_encoders, 0, 2);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -11,6 +11,7 @@
 
 #include "linuxcnc_peer.h"
 #include "process.h"
+#include "suite.h"
 
 #define LIMIT_MS 300000 /* half a minute, on a machine with nothing else to do */
 
@@ -60,9 +61,5 @@ int main(void)
     tcase_set_timeout(tests, 320);
     tcase_add_test(tests, a_pulled_remote_stops_alone_is_reported_and_comes_back);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

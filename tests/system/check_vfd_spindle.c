@@ -15,6 +15,7 @@
 
 #include "serial_pair.h"
 #include "simulator.h"
+#include "suite.h"
 #include "talk.h"
 
 #define LIMIT_MS 30000
@@ -171,9 +172,5 @@ int main(void)
     tcase_add_test(tests, the_maps_of_the_examples_are_good);
     tcase_add_test(tests, a_drive_that_was_away_is_told_its_speed_again);
     suite_add_tcase(suite, tests);
-    SRunner *const runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    const int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed > 0;
+    return run_suite(suite);
 }

@@ -86,6 +86,34 @@ static void fill_flash(struct torture *const t)
     take_image(t);
 }
 
+static void note_erase(void *const context, const uint8_t *const data, const size_t len, const bool done)
+{
+    struct torture *const t = context;
+    const struct sim_flash_counts now = sim_card_flash_counts(t->sim);
+    (void)data;
+    (void)len;
+    t->datagrams += done;
+    if (done && now.erases > t->erases_seen) {
+        assert_true(t->erase_count < TORTURE_ERASES);
+        t->erase[t->erase_count++] = (struct torture_erase){now.operations, t->datagrams};
+    }
+    t->erases_seen = now.erases;
+}
+
+void torture_undisturbed(struct torture *const t)
+{
+    torture_reset(t);
+    t->datagrams = 0;
+    t->erase_count = 0;
+    sim_net_on_taken(t->net, note_erase, t);
+    const int err = torture_run(t);
+    sim_net_on_taken(t->net, NULL, NULL);
+    if (err != t->result)
+        fail_msg("undisturbed: %s", t->diag.text);
+    t->operations = sim_card_flash_counts(t->sim).operations;
+    torture_check_wanted(t, "undisturbed", 0);
+}
+
 struct torture *torture_new(const struct torture_setup *const setup)
 {
     struct torture *const t = calloc(1, sizeof *t);
@@ -103,11 +131,8 @@ struct torture *torture_new(const struct torture_setup *const setup)
     assert_true(t->before && t->wanted && t->dump && t->file);
     t->options.confirmed = true;
     fill_flash(t);
-    torture_reset(t);
-    if (torture_run(t) != (setup->kind == TORTURE_VERIFY_OTHER ? HM2_ERR_MISMATCH : 0))
-        fail_msg("undisturbed: %s", t->diag.text);
-    t->operations = sim_card_flash_counts(t->sim).operations;
-    torture_check_wanted(t, "undisturbed", 0);
+    t->result = setup->kind == TORTURE_VERIFY_OTHER ? HM2_ERR_MISMATCH : 0;
+    torture_undisturbed(t);
     return t;
 }
 

@@ -27,6 +27,13 @@ struct torture_setup {
     uint8_t flash_id;  /* of the chip; 0 = as delivered */
 };
 
+#define TORTURE_ERASES 8u
+
+/* A sector erase of an undisturbed run. */
+struct torture_erase {
+    uint64_t operation, datagram; /* its numbers, from 1 */
+};
+
 struct torture {
     struct torture_setup setup;
     struct sim_card *sim;
@@ -39,7 +46,12 @@ struct torture {
     uint32_t filler_at; /* behind the image to the end of its page: no part of it; 0 = none */
     struct flash_options options;
     struct hm2_diag diag;
-    uint64_t operations; /* that an undisturbed run takes */
+    /* Of an undisturbed run: */
+    int result;
+    uint64_t operations, datagrams; /* datagrams that the card took */
+    uint64_t erases_seen;           /* so far, of the chip */
+    struct torture_erase erase[TORTURE_ERASES];
+    unsigned erase_count;
 };
 
 /* FLASH_TORTURE=N makes N times as many runs; 1 by default. */
@@ -47,6 +59,9 @@ unsigned torture_factor(void);
 
 struct torture *torture_new(const struct torture_setup *setup);
 void torture_free(struct torture *torture);
+
+/* Find out again what an undisturbed run does, which the link and the chip's times change. */
+void torture_undisturbed(struct torture *torture);
 
 /* As at the beginning, without faults. */
 void torture_reset(struct torture *torture);

@@ -16,8 +16,7 @@
 #define IMAGE_BYTES 67000u /* the sector that makes it valid, and a little of another one */
 #define LATE_BYTES  1000u
 #define CHIP        0x12u /* 4 Mbit */
-#define ERASES_MOST 8u
-#define RUNS        80u /* of each command, about */
+#define RUNS        80u   /* of each command, about */
 
 static const struct scenario {
     const char *name;
@@ -38,11 +37,7 @@ struct matrix {
     const struct scenario *scenario;
     struct torture *t;
     struct unruly_link link;
-    uint64_t datagrams[2];         /* requests and replies of an undisturbed run */
-    uint64_t erasing[ERASES_MOST]; /* numbers of those that erase */
-    unsigned erase_count;
-    uint64_t erases_seen;
-    int wanted; /* result */
+    uint64_t datagrams[2]; /* requests and replies of an undisturbed run */
     unsigned runs, failed;
     char what[96]; /* is being done */
 };
@@ -64,50 +59,36 @@ static void run_disturbed(struct matrix *const m, const struct unruly_fault *con
     unruly_link_release(&m->link);
     torture_settle(t);
     torture_check_starts(t, m->what, f->at);
-    if (err != m->wanted && (f->what != UNRULY_GONE || err != HM2_ERR_TIMEOUT))
+    if (err != t->result && (f->what != UNRULY_GONE || err != HM2_ERR_TIMEOUT))
         fail_run(m, f, err);
     m->runs++;
-    if (err == m->wanted) {
+    if (err == t->result) {
         torture_check_wanted(t, m->what, f->at);
         return;
     }
     m->failed++;
     torture_power_up(t);
     torture_check_starts(t, m->what, f->at);
-    if (torture_run(t) != m->wanted)
+    if (torture_run(t) != t->result)
         fail_run(m, f, HM2_ERR_IO);
     torture_check_wanted(t, m->what, f->at);
 }
 
-static void note_erase(void *const context, const uint8_t *const data, const size_t len, const bool done)
+static bool erases(const struct torture *const t, const uint64_t request)
 {
-    struct matrix *const m = context;
-    const uint64_t erases = sim_card_flash_counts(m->t->sim).erases;
-    (void)data;
-    (void)len;
-    if (done && erases > m->erases_seen) {
-        assert_true(m->erase_count < ERASES_MOST);
-        m->erasing[m->erase_count++] = m->link.seen[0];
-    }
-    m->erases_seen = erases;
-}
-
-static bool erases(const struct matrix *const m, const uint64_t number)
-{
-    for (unsigned i = 0; i < m->erase_count; i++)
-        if (m->erasing[i] == number)
+    for (unsigned i = 0; i < t->erase_count; i++)
+        if (t->erase[i].datagram == request)
             return true;
     return false;
 }
 
+/* Through a link that disturbs, with the times of a real chip. */
 static void run_undisturbed(struct matrix *const m)
 {
     unruly_link_init(&m->link, sim_net_link(m->t->net));
     m->t->link = &m->link.link;
-    torture_reset(m->t);
-    sim_net_on_taken(m->t->net, note_erase, m);
-    assert_int_equal(torture_run(m->t), m->wanted);
-    sim_net_on_taken(m->t->net, NULL, NULL);
+    sim_card_flash_times(m->t->sim, sim_flash_times_of("m25p16"));
+    torture_undisturbed(m->t);
     memcpy(m->datagrams, m->link.seen, sizeof m->datagrams);
 }
 
@@ -115,15 +96,13 @@ static void disturb_all(const struct scenario *const scenario)
 {
     struct matrix m = {.scenario = scenario, .t = torture_new(&scenario->setup)};
     const uint64_t runs_wanted = (uint64_t)RUNS * torture_factor();
-    m.wanted = scenario->setup.kind == TORTURE_VERIFY_OTHER ? HM2_ERR_MISMATCH : 0;
-    sim_card_flash_times(m.t->sim, sim_flash_times_of("m25p16"));
     run_undisturbed(&m);
     const uint64_t step = UNRULY_KINDS * (m.datagrams[0] + m.datagrams[1]) / runs_wanted + 1;
     for (unsigned i = 0; i < 2u * UNRULY_KINDS; i++) {
         struct unruly_fault fault = {.what = (enum unruly)(i / 2), .reply = i % 2, .at = 1};
         const uint64_t first = i * step / (2u * UNRULY_KINDS) + 1;
         for (; fault.at <= m.datagrams[fault.reply]; fault.at++)
-            if (fault.at % step == first % step || erases(&m, fault.at))
+            if (fault.at % step == first % step || erases(m.t, fault.at))
                 run_disturbed(&m, &fault);
     }
     printf("%s, %s: %u runs, in each one of %" PRIu64 " requests or %" PRIu64

@@ -10,6 +10,7 @@
 #include <hm2/board.h>
 #include <hm2/lbp_remote.h>
 
+#include "../common/json_string.h"
 #include "../common/whole_file.h"
 #include "options.h"
 
@@ -126,14 +127,6 @@ static void disconnect(struct session *const s)
 /* ---- printing -----------------------------------------------------------------------------------------------------
  */
 
-static void print_json_string(const char *const text)
-{
-    putchar('"');
-    for (const char *c = text; *c; c++)
-        printf(*c == '"' || *c == '\\' ? "\\%c" : "%c", *c);
-    putchar('"');
-}
-
 static const char *access_text(const struct sslbp_field *const field)
 {
     return field->direction == SSLBP_INPUT ? "read" : field->direction == SSLBP_OUTPUT ? "write" : "both";
@@ -142,12 +135,12 @@ static const char *access_text(const struct sslbp_field *const field)
 static void print_json_field(const struct sslbp_field *const field, const char *const value)
 {
     printf("{\"name\": ");
-    print_json_string(field->name);
+    json_string(stdout, field->name);
     printf(", \"value\": \"%s\", \"bits\": %u, \"access\": \"%s\", \"nonvolatile\": %s, \"min\": %.9g, \"max\": %.9g, "
            "\"unit\": ",
            value, field->bits, access_text(field), sslbp_is_nonvolatile(field) ? "true" : "false", field->min,
            field->max);
-    print_json_string(field->unit);
+    json_string(stdout, field->unit);
     putchar('}');
 }
 
@@ -180,7 +173,7 @@ static void begin_list(const struct session *const s)
         return;
     }
     printf("{\"card\": ");
-    print_json_string(identity->name);
+    json_string(stdout, identity->name);
     printf(", \"unit\": %u, \"parameters\": [", (unsigned)identity->unit);
 }
 
