@@ -146,11 +146,16 @@ static int registers(modbus_t *const modbus, const struct hm2_modbus_transaction
     return result;
 }
 
+static void set_response_timeout(modbus_t *const modbus, const unsigned ms)
+{
+    (void)modbus_set_response_timeout(modbus, ms / 1000, ms % 1000 * 1000);
+}
+
 static int ask(modbus_t *const modbus, const struct hm2_modbus_transaction *const map, uint16_t *const words)
 {
     if (modbus_set_slave(modbus, (int)map->unit) != 0)
         return -1;
-    (void)modbus_set_response_timeout(modbus, map->response_timeout_ms / 1000, map->response_timeout_ms % 1000 * 1000);
+    set_response_timeout(modbus, map->response_timeout_ms);
     (void)modbus_set_byte_timeout(modbus, map->byte_timeout_ms / 1000, map->byte_timeout_ms % 1000 * 1000);
     const int result = hm2_modbus_is_bits(map->function) ? bits(modbus, map, words) : registers(modbus, map, words);
     if (result >= 0 && result != (int)map->words) {
@@ -228,9 +233,27 @@ static const char *prepare_serial(const struct line *const line)
     return NULL;
 }
 
+/* libmodbus waits for a connection as long as for an answer. A link's transactions may differ in that: the connection,
+ * which serves all of them, has the longest time. */
+static int connect_line(const struct line *const line)
+{
+    unsigned longest_ms = 1;
+    for (unsigned i = 0; i < line->engine->map->transaction_count; i++) {
+        const struct transaction *const tx = &line->engine->transactions[i];
+        if (of_line(line, tx) && tx->map->response_timeout_ms > longest_ms)
+            longest_ms = tx->map->response_timeout_ms;
+    }
+    set_response_timeout(line->modbus, longest_ms);
+    if (modbus_connect(line->modbus) == 0)
+        return 0;
+    if (errno == EINPROGRESS) /* what some versions leave there when the time is over */
+        errno = ETIMEDOUT;
+    return -1;
+}
+
 static void open_line(struct line *const line)
 {
-    const char *problem = modbus_connect(line->modbus) == 0 ? NULL : "cannot be opened";
+    const char *problem = connect_line(line) == 0 ? NULL : "cannot be opened";
     if (!problem && !line->map->tcp)
         problem = prepare_serial(line);
     if (!problem) {

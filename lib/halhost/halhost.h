@@ -46,7 +46,7 @@ struct halhost_options {
     const struct halhost_builtin *builtins; /* besides "threads", which is always there */
     size_t builtin_count;
     const char *const *folders; /* where components are looked for, first match wins; NULL-terminated or NULL */
-    int cpu; /* realtime threads run there; HALHOST_CPU_DEFAULT: the last allowed, when they have realtime rights */
+    int cpu; /* threads run there; HALHOST_CPU_DEFAULT: the best (processor.h), when they have realtime rights */
     bool no_realtime; /* do not even ask for realtime priority and locked memory */
 };
 

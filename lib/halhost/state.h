@@ -116,6 +116,7 @@ struct hh {
     int last_id, last_task;
     unsigned char lock;
     bool running; /* threads were started */
+    int cpu;      /* that they are bound to when they have realtime priority, or -1 */
     bool realtime_warned, memory_locked;
     struct hh_messages *messages;
 };

@@ -6,6 +6,7 @@
  * A cycle that ends after the next one should have begun is an overrun. The next cycle then begins at once; whole
  * periods that have passed are left out and counted as missed, so cycles never run in a burst and keep their phase.
  */
+#include "processor.h"
 #include "state.h"
 
 #include <errno.h>
@@ -168,20 +169,13 @@ int hh_thread_quiesce(const struct hh_thread *const thread, struct hm2_diag *con
 
 /* ---- start and stop --------------------------------------------------------------------------------------------- */
 
-/* The processor that realtime threads are bound to, or -1. One for all: HAL functions of a slow thread expect to be
- * interrupted by those of a fast one, not to run beside them. */
-static int choose_cpu(const struct hh *const host, const bool realtime)
+/* The processor that threads are bound to, or -1. One for all: HAL functions of a slow thread expect to be interrupted
+ * by those of a fast one, not to run beside them. */
+static int choose_cpu(const struct halhost_options *const options)
 {
-    if (host->options.cpu >= 0 || host->options.cpu == HALHOST_CPU_ANY || !realtime)
-        return host->options.cpu >= 0 ? host->options.cpu : -1;
-    cpu_set_t allowed;
-    if (sched_getaffinity(0, sizeof allowed, &allowed))
-        return -1;
-    for (int cpu = CPU_SETSIZE - 1; cpu >= 0; cpu--) {
-        if (CPU_ISSET((size_t)cpu, &allowed))
-            return cpu;
-    }
-    return -1;
+    if (options->cpu >= 0)
+        return options->cpu;
+    return options->cpu == HALHOST_CPU_ANY || options->no_realtime ? -1 : hh_processor_choose();
 }
 
 static int create(struct hh *const host, struct hh_thread *const thread, const bool realtime)
@@ -197,11 +191,11 @@ static int create(struct hh *const host, struct hh_thread *const thread, const b
         (void)pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
         (void)pthread_attr_setschedparam(&attributes, &param);
     }
-    const int cpu = choose_cpu(host, realtime);
-    if (cpu >= 0 && cpu < CPU_SETSIZE) {
+    /* Without realtime priority it would wait for whatever runs there: only where that was asked for. */
+    if (host->cpu >= 0 && host->cpu < CPU_SETSIZE && (realtime || host->options.cpu >= 0)) {
         cpu_set_t set;
         CPU_ZERO(&set);
-        CPU_SET((size_t)cpu, &set);
+        CPU_SET((size_t)host->cpu, &set);
         (void)pthread_attr_setaffinity_np(&attributes, sizeof set, &set);
     }
     /* Signals are for the program's thread. */
@@ -272,6 +266,7 @@ int hh_threads_start(struct hh *const host, struct hm2_diag *const diag)
     if (host->running)
         return 0;
     lock_memory(host);
+    host->cpu = choose_cpu(&host->options);
     host->running = true;
     for (size_t i = 0; i < host->threads.count; i++) {
         const int err = start_one(host, host->threads.items[i], diag);

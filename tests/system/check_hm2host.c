@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* hm2host as a program: files good and bad, signals, the prompt, threads, and LinuxCNC's own components. */
 #include <check.h>
+#include <dirent.h>
 #include <errno.h>
 #include <poll.h>
 #include <pty.h>
@@ -293,18 +294,116 @@ START_TEST(messages_of_threads_are_printed)
 }
 END_TEST
 
-START_TEST(missing_realtime_rights_are_told)
+/* Neither a capability nor a limit allows realtime priority to what is started from here. */
+static void drop_realtime_rights(void)
 {
     const struct rlimit none = {0, 0};
-    /* Neither a capability nor a limit allows it to what is started from here. */
     (void)prctl(PR_CAPBSET_DROP, CAP_SYS_NICE, 0, 0, 0);
     (void)setrlimit(RLIMIT_RTPRIO, &none);
+}
+
+START_TEST(missing_realtime_rights_are_told)
+{
+    drop_realtime_rights();
     const char *const text = "loadrt threads name1=t\nstart\nrun 0.01\n";
     ck_assert_int_eq(run_hal(text), 0);
     expect_text("no realtime rights");
     const char *const args[] = {"--no-realtime", in_folder("t.hal"), NULL};
     ck_assert_int_eq(run_host(args), 0);
     expect_text("without realtime priority, as asked");
+}
+END_TEST
+
+/* The processor of the program's realtime threads: the only one that they may use, and the same for all. -1 = it has
+ * none, and no thread is kept from a processor that the test may use. */
+static int processor_of(const struct process *const program)
+{
+    char path[64];
+    snprintf(path, sizeof path, "/proc/%ld/task", (long)program->pid);
+    DIR *const threads = opendir(path);
+    ck_assert_ptr_nonnull(threads);
+    cpu_set_t own, set;
+    ck_assert_int_eq(sched_getaffinity(0, sizeof own, &own), 0);
+    int found = -1;
+    for (const struct dirent *thread; (thread = readdir(threads));) {
+        const pid_t id = (pid_t)strtol(thread->d_name, NULL, 10);
+        if (id <= 0)
+            continue;
+        ck_assert_int_eq(sched_getaffinity(id, sizeof set, &set), 0);
+        if (sched_getscheduler(id) != SCHED_FIFO) {
+            ck_assert(CPU_EQUAL(&set, &own));
+            continue;
+        }
+        ck_assert_int_eq(CPU_COUNT(&set), 1);
+        ck_assert(found < 0 || CPU_ISSET((size_t)found, &set));
+        for (found = 0; !CPU_ISSET((size_t)found, &set);)
+            found++;
+    }
+    closedir(threads);
+    return found;
+}
+
+static int start_threads(struct process *const program, const char *const cpu)
+{
+    const char *const hal = write_file("threads.hal", "loadrt threads name1=a period1=10000000 name2=b "
+                                                      "period2=20000000 name3=c period3=40000000\n"
+                                                      "start\necho running\nrun 1000\n");
+    const char *const argv[] = {process_built("hm2host"), hal, cpu ? "--cpu" : NULL, cpu, NULL};
+    process_start(program, argv);
+    ck_assert_msg(process_wait_line(program, "running", END_MS, NULL), "%s", program->text);
+    return processor_of(program);
+}
+
+/* Two processors, or the only one, on which nothing depends on how many a machine has. */
+static int take_two_processors(void)
+{
+    cpu_set_t own, two;
+    CPU_ZERO(&two);
+    ck_assert_int_eq(sched_getaffinity(0, sizeof own, &own), 0);
+    for (size_t cpu = 0; cpu < CPU_SETSIZE && CPU_COUNT(&two) < 2; cpu++) {
+        if (CPU_ISSET(cpu, &own))
+            CPU_SET(cpu, &two);
+    }
+    ck_assert_int_eq(sched_setaffinity(0, sizeof two, &two), 0);
+    return CPU_COUNT(&two);
+}
+
+static bool has_isolated_processors(void)
+{
+    FILE *const list = fopen("/sys/devices/system/cpu/isolated", "r");
+    const int first = list ? fgetc(list) : EOF;
+    if (list)
+        fclose(list);
+    return first >= '0' && first <= '9';
+}
+
+/* With so many that programs of others on the machine make no difference. */
+START_TEST(threads_keep_away_from_those_of_other_hosts)
+{
+    static struct process others[4];
+    if (has_isolated_processors()) {
+        printf("SKIP: this machine has isolated processors, which threads prefer\n");
+        return;
+    }
+    if (_i == 1)
+        drop_realtime_rights();
+    const int processors = take_two_processors();
+    const int alone = start_threads(&host, NULL);
+    process_stop(&host, SIGTERM, END_MS);
+    char cpu[16];
+    snprintf(cpu, sizeof cpu, "%d", alone);
+    for (int i = 0; i < 4 && alone >= 0; i++)
+        ck_assert_int_eq(start_threads(&others[i], cpu), alone);
+    const int beside = start_threads(&host, NULL);
+    if (alone < 0)
+        ck_assert_int_eq(beside, -1);
+    else if (processors == 1)
+        ck_assert_int_eq(beside, alone);
+    else
+        ck_assert_int_ne(beside, alone);
+    process_stop(&host, SIGTERM, END_MS);
+    for (int i = 0; i < 4 && alone >= 0; i++)
+        process_stop(&others[i], SIGTERM, END_MS);
 }
 END_TEST
 
@@ -739,6 +838,7 @@ int main(void)
     tcase_add_test(tests, threads_run_at_their_periods);
     tcase_add_test(tests, messages_of_threads_are_printed);
     tcase_add_test(tests, missing_realtime_rights_are_told);
+    tcase_add_loop_test(tests, threads_keep_away_from_those_of_other_hosts, 0, 2);
     tcase_add_test(tests, a_function_that_hangs_ends_the_program_with_its_name);
     tcase_add_test(tests, an_interrupt_ends_run_and_the_file_goes_on);
     tcase_add_test(tests, termination_unloads_everything);

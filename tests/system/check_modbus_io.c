@@ -3,9 +3,11 @@
  * modbus_io against servers of libmodbus and pymodbus, over TCP and over a pseudo-terminal, with their faults, and
  * against LinuxCNC's own mb2hal with the same file; hm2_mb2hal against mb2hal under LinuxCNC.
  */
+#include <arpa/inet.h>
 #include <check.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <netinet/tcp.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -47,7 +49,7 @@ struct device {
 static struct device *device;
 static pid_t server;
 static char address[16], folder[64], terminal[64];
-static int master = -1, response_ms;
+static int master = -1, listener = -1, response_ms;
 static struct talk hal;
 
 static bool is_write(const int function)
@@ -107,7 +109,8 @@ static void serve(modbus_t *const modbus)
 static void serve_tcp(void)
 {
     modbus_t *const modbus = modbus_new_tcp(address, PORT);
-    int listener = modbus_tcp_listen(modbus, 1);
+    if (listener < 0)
+        listener = modbus_tcp_listen(modbus, 1);
     if (listener < 0)
         _exit(3);
     while (modbus_tcp_accept(modbus, &listener) >= 0) {
@@ -444,6 +447,75 @@ START_TEST(a_server_that_was_killed_and_comes_back_gets_its_outputs_again)
 }
 END_TEST
 
+/* A device whose queue of connections is full: it answers no more until its server takes them. */
+static void make_busy_device(void)
+{
+    modbus_t *const modbus = modbus_new_tcp(address, PORT);
+    listener = modbus_tcp_listen(modbus, 0);
+    ck_assert_int_ge(listener, 0);
+    ck_assert_int_eq(modbus_connect(modbus), 0); /* all that the queue holds */
+    modbus_free(modbus);
+}
+
+/* Whether the kernel has asked for a connection to the device more than once, which it does after a second. */
+static bool asked_again(void)
+{
+    char line[256], wanted[16];
+    snprintf(wanted, sizeof wanted, "%08X:%04X", (unsigned)inet_addr(address), (unsigned)PORT);
+    FILE *const connections = fopen("/proc/net/tcp", "re");
+    ck_assert_ptr_nonnull(connections);
+    bool found = false;
+    while (!found && fgets(line, sizeof line, connections)) {
+        char remote[16], tries[16];
+        unsigned state;
+        found = sscanf(line, " %*s %*s %15s %x %*s %*s %15s", remote, &state, tries) == 3 &&
+                strcmp(remote, wanted) == 0 && state == TCP_SYN_SENT && strtoul(tries, NULL, 16) > 0;
+    }
+    fclose(connections);
+    return found;
+}
+
+/* The longest time of the link's transactions, whether they run or not. */
+START_TEST(a_connection_has_as_long_as_an_answer)
+{
+    response_ms = 100;
+    write_file("slow.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=2\n", tcp_link(),
+               "MB_TX_CODE=fnct_03_read_holding_registers\nFIRST_ELEMENT=0\nNELEMENTS=1\nENABLE_PIN=1\n"
+               "[TRANSACTION_01]\nMB_TX_CODE=fnct_03_read_holding_registers\nFIRST_ELEMENT=1\nNELEMENTS=1\n"
+               "ENABLE_PIN=0\nMB_RESPONSE_TIMEOUT_MS=25000\n");
+    make_busy_device();
+    load(path("slow.ini"));
+    talk_do(&hal, "start");
+    bool again = false;
+    for (unsigned ms = 0; ms < LIMIT_MS && !again; ms += 20) {
+        pause_ms(20);
+        again = asked_again();
+    }
+    ck_assert(again);
+    start_server();
+    await_pin("mb2hal.01.00.int", 1001, 1001);
+    ck_assert_double_eq(talk_value(&hal, "mb2hal.01.errors"), 0);
+    talk_end(&hal);
+}
+END_TEST
+
+START_TEST(a_connection_that_takes_longer_is_tried_anew)
+{
+    response_ms = 100;
+    write_file("busy.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=1\n", tcp_link(),
+               "MB_TX_CODE=fnct_03_read_holding_registers\nFIRST_ELEMENT=1\nNELEMENTS=1\n");
+    make_busy_device();
+    load(path("busy.ini"));
+    talk_do(&hal, "start");
+    talk_wait_text(&hal, "cannot be opened: Connection timed out; trying again");
+    await_pin("mb2hal.00.errors", 2, 1e9);
+    ck_assert_double_eq(talk_value(&hal, "mb2hal.00.connected"), 0);
+    start_server();
+    await_pin("mb2hal.00.00.int", 1001, 1001);
+    talk_end(&hal);
+}
+END_TEST
+
 /* While the fault lasts nothing it brings is taken for good; afterwards all is as before. */
 static void survive(const enum fault fault)
 {
@@ -701,6 +773,8 @@ int main(void)
     tcase_add_test(tests, what_does_not_change_is_written_once);
     tcase_add_test(tests, what_does_not_change_is_written_again_after_the_time_that_is_set);
     tcase_add_test(tests, a_server_that_was_killed_and_comes_back_gets_its_outputs_again);
+    tcase_add_test(tests, a_connection_has_as_long_as_an_answer);
+    tcase_add_test(tests, a_connection_that_takes_longer_is_tried_anew);
     tcase_add_test(tests, silent_slow_and_truncated_answers_over_tcp);
     tcase_add_test(tests, silence_and_wrong_checksums_on_a_terminal);
     tcase_add_test(tests, a_port_without_rs485_is_told_with_what_to_do);
