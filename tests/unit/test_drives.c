@@ -454,7 +454,7 @@ static void turns_are_counted_and_velocity_follows_the_excitation(void **state)
     rig_free(rig);
 }
 
-static void index_reset_and_position_file_of_a_resolver(void **state)
+static void index_and_reset_of_a_resolver(void **state)
 {
     (void)state;
     struct module_rig *const rig = started(&hm2_resolver_type, "");
@@ -470,14 +470,55 @@ static void index_reset_and_position_file_of_a_resolver(void **state)
     rig_set(rig, "resolver.00.reset", 1);
     rig_cycle(rig);
     assert_true(rig_get(rig, "resolver.00.position") == 0.0);
-    rig_set(rig, "resolver.00.reset", 0);
+    rig_free(rig);
+}
+
+/* As LinuxCNC does it: joint = position of the file + position of the resolver. */
+static void the_position_file_gives_a_joint_its_place_back(void **state)
+{
+    (void)state;
+    static const struct {
+        double scale, file, place; /* when LinuxCNC ended, and of the motor now */
+    } rows[] = {{1, 7.3, 7.4}, {1, -7.3, -7.4}, {-3.5, 12, 13}, {20, 5, 1},
+                {1, 2.9, 3.1}, {1, 0, 0.125},   {0.5, 1e9, 1e9}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct module_rig *const rig = started(&hm2_resolver_type, "");
+        const double turns = rows[i].place / rows[i].scale;
+        rig_set(rig, "resolver.00.scale", rows[i].scale);
+        rig_set(rig, "resolver.00.use-position-file", 1);
+        rig_put(rig, 0x4000, (uint32_t)((turns - floor(turns)) * 4294967295.0));
+        for (unsigned cycle = 0; cycle < 4900; cycle++)
+            rig_cycle(rig);
+        assert_true(rig_get(rig, "resolver.00.position") == 0.0);
+        assert_true(rig_get(rig, "resolver.00.use-position-file") == 1);
+        rig_set(rig, "resolver.00.joint-pos-fb", rows[i].file);
+        for (unsigned cycle = 0; cycle < 200; cycle++)
+            rig_cycle(rig);
+        assert_true(rig_get(rig, "resolver.00.use-position-file") == 0);
+        assert_true(fabs(rows[i].file + rig_get(rig, "resolver.00.position") - rows[i].place) < 1e-6);
+        rig_free(rig);
+    }
+}
+
+static void an_impossible_joint_position_is_not_taken(void **state)
+{
+    (void)state;
+    static const double joints[] = {NAN, INFINITY, -INFINITY};
+    struct module_rig *const rig = started(&hm2_resolver_type, "");
     rig_set(rig, "resolver.00.use-position-file", 1);
-    rig_cycle(rig);
-    assert_true(rig_get(rig, "resolver.00.use-position-file") == 1);
-    rig_set(rig, "resolver.00.joint-pos-fb", 7.3);
+    rig_put(rig, 0x4000, 0x40000000);
+    rig_put(rig, 0x3E00, 1);
+    for (size_t i = 0; i < sizeof joints / sizeof joints[0]; i++) {
+        rig_set(rig, "resolver.00.joint-pos-fb", joints[i]);
+        rig_cycle(rig);
+        assert_true(rig_get(rig, "resolver.00.position") == 0.0);
+        assert_true(rig_get(rig, "resolver.00.use-position-file") == 1);
+        assert_true(rig_get(rig, "resolver.00.error") == 1); /* which is told all the same */
+    }
+    rig_set(rig, "resolver.00.joint-pos-fb", 1e300);
     rig_cycle(rig);
     assert_true(rig_get(rig, "resolver.00.use-position-file") == 0);
-    assert_true(rig_get(rig, "resolver.00.position") == 7.125);
+    assert_true(fabs(rig_get(rig, "resolver.00.position")) <= 1.0);
     rig_free(rig);
 }
 
@@ -528,7 +569,9 @@ int main(void)
         cmocka_unit_test(a_simulated_galvo_moves_and_tells_its_limits),
         cmocka_unit_test(recorded_positions_are_the_angles_of_the_bench),
         cmocka_unit_test(turns_are_counted_and_velocity_follows_the_excitation),
-        cmocka_unit_test(index_reset_and_position_file_of_a_resolver),
+        cmocka_unit_test(index_and_reset_of_a_resolver),
+        cmocka_unit_test(the_position_file_gives_a_joint_its_place_back),
+        cmocka_unit_test(an_impossible_joint_position_is_not_taken),
         cmocka_unit_test(an_index_is_found_every_few_turns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
