@@ -151,7 +151,7 @@ static bool take_file(struct resolver *const r, const struct hm2_module *const m
     }
     if (joint == 0.0 && ++r->waited < JOINT_WAIT)
         return false;
-    const double whole = floor(turns - now / TURN + 0.5);
+    const double whole = ceil(turns - now / TURN - 0.5);
     r->turned = r->last = now;
     r->zero = (int64_t)((turns - whole) * TURN); /* some turns at most */
     r->waited = 0;
