@@ -70,7 +70,8 @@ static double scale_of(const struct servo *const servo, const struct hm2_module 
     return *servo->scale = 1.0;
 }
 
-/* One step for the shortest pulse, so the register holds one less; nothing at all for less than that. */
+/* One step for the shortest pulse, so the register holds one less; nothing at all for less than that. The pin stays as
+ * it is: a width that only the offset or the scale makes impossible is right again with them. */
 static uint32_t width_of(const struct servo *const servo, const struct hm2_module *const module, const unsigned number)
 {
     const double scale = scale_of(servo, module, number);
@@ -81,7 +82,6 @@ static uint32_t width_of(const struct servo *const servo, const struct hm2_modul
     }
     if (ms < 0.0) {
         hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "width", number, *servo->width);
-        *servo->width = -*servo->offset * scale;
         return NO_PULSE;
     }
     const double steps = ms * module->md->clock_hz / (CLOCKS_STEP * 1000.0);

@@ -69,12 +69,12 @@ static const struct hm2_point points[] = {
     ROW(reset, "reset", HM2_BIT, HM2_PIN_IN, 0, "", "1: count and position are held at 0"),
     ROW(index_enable, "index-enable", HM2_BIT, HM2_PIN_IO, 0, "", "1: zero at the next whole turn, then go to 0"),
     ROW(error, "error", HM2_BIT, HM2_PIN_OUT, 0, "", "1: the signal is too weak; the position stands"),
-    ROW(joint_pos_fb, "joint-pos-fb", HM2_FLOAT, HM2_PIN_IN, 0, "units", "position from the position file"),
+    ROW(joint_pos_fb, "joint-pos-fb", HM2_FLOAT, HM2_PIN_IN, 0, "units", "of the joint, for use-position-file"),
     ROW(scale, "scale", HM2_FLOAT, HM2_PARAM_RW, 1, "units", "position of a turn"),
     ROW(velocity_scale, "velocity-scale", HM2_FLOAT, HM2_PARAM_RW, 1, "", "velocity at a turn in a second"),
     ROW(index_divisor, "index-divisor", HM2_U32, HM2_PARAM_RW, 1, "", "electrical turns from index to index"),
     ROW(use_position_file, "use-position-file", HM2_BIT, HM2_PARAM_RW, 0, "",
-        "1: take the turn nearest to joint-pos-fb, once"),
+        "1: wait for joint-pos-fb, then count from there, in the nearest turn"),
 };
 
 static const struct hm2_point_group groups[] = {
@@ -138,19 +138,25 @@ static void find_index(struct resolver *const r, const int64_t before)
     *r->index_enable = false;
 }
 
-/* The position file knows the turn, the resolver the angle within it. */
-static void take_file(struct resolver *const r, const double scale)
+/* LinuxCNC's motion controller adds the position of its file to what is read here. So the position is 0 until the
+ * joint's is known, and from then on how far the resolver is from there, in the turn that is nearest. Whether it is
+ * known. */
+static bool take_file(struct resolver *const r, const struct hm2_module *const module, const unsigned number,
+                      const uint32_t now)
 {
-    const double joint = *r->joint_pos_fb;
-    if (!isfinite(joint) || (joint == 0.0 && ++r->waited < JOINT_WAIT))
-        return;
-    const double whole = floor(joint / scale - (uint32_t)(uint64_t)r->turned / TURN + 0.5);
-    if (fabs(whole) < 1e9) {
-        r->turned = (int64_t)((uint64_t)(int64_t)whole << 32 | (uint32_t)(uint64_t)r->turned);
-        r->zero = 0;
+    const double joint = *r->joint_pos_fb, turns = joint / usable(r->scale, module, "scale", number);
+    if (!isfinite(turns)) {
+        hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, "joint-pos-fb", number, joint);
+        return false;
     }
+    if (joint == 0.0 && ++r->waited < JOINT_WAIT)
+        return false;
+    const double whole = ceil(turns - now / TURN - 0.5);
+    r->turned = r->last = now;
+    r->zero = (int64_t)((turns - whole) * TURN); /* some turns at most */
     r->waited = 0;
     *r->use_position_file = false;
+    return true;
 }
 
 static void show(const struct resolvers *const ctx, const struct hm2_module *const module, const unsigned number)
@@ -176,16 +182,16 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     for (unsigned i = 0; i < ctx->count; i++) {
         struct resolver *const r = &ctx->resolver[i];
         const uint32_t now = hm2_window_get(&ctx->positions, i);
+        *r->error = bad >> i & 1u;
+        if (*r->use_position_file && !take_file(r, module, i, now))
+            continue;
         const int64_t before = r->turned;
         r->turned = (int64_t)((uint64_t)r->turned + (uint64_t)(int64_t)(int32_t)(now - r->last));
         r->last = now;
         if (*r->index_enable)
             find_index(r, before);
-        if (*r->use_position_file)
-            take_file(r, usable(r->scale, module, "scale", i));
         if (*r->reset)
             r->zero = r->turned;
-        *r->error = bad >> i & 1u;
         show(ctx, module, i);
     }
 }

@@ -145,7 +145,8 @@ static double limited(const struct sserial_field *const field, const struct plac
         return 0.0;
     }
     const double min = *field->as.number.minlim, max = *field->as.number.maxlim;
-    return value < min ? min : value > max ? max : value;
+    const double below = value > max ? max : value;
+    return below < min ? min : below; /* where the limits cross, the lower one counts, as with LinuxCNC's driver */
 }
 
 static void put_boolean(const struct sserial_field *const field, uint32_t *const words, const struct place *const place)

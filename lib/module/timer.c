@@ -45,7 +45,8 @@ int hm2_timer_add(struct hm2_timer *const timer, const struct hm2_module *const 
 void hm2_timer_change(struct hm2_timer *const timer, const struct hm2_module *const module)
 {
     if (!valid(*timer->number)) {
-        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "timer-number", HM2_NO_INSTANCE, *timer->number);
+        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, timer->name ? timer->name : "timer-number", HM2_NO_INSTANCE,
+                         *timer->number);
         *timer->number = 0;
     }
     timer->seen = *timer->number;

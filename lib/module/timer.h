@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Selection of the DPLL timer that samples a module's counters. Private to lib/module. */
+/* Selection of the DPLL timer that a module goes by. Private to lib/module. */
 #ifndef HM2_MODULE_TIMER_H
 #define HM2_MODULE_TIMER_H
 
 #include <hm2/module.h>
 
-/* The pin timer-number of a module and its register. */
+/* A pin of a module that selects a timer, and its register. */
 struct hm2_timer {
     hm2_s32_t *number; /* NULL without a DPLL: then there is no pin */
+    const char *name;  /* of that pin; NULL: timer-number */
     int32_t seen;
     bool present; /* the card has the register; without it the pin has no effect */
     struct hm2_section section;

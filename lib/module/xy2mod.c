@@ -6,6 +6,7 @@
 
 #include "bind.h"
 #include "module_types.h"
+#include "timer.h"
 
 enum { REG_ACC = 0, REG_VEL = 2, REG_POS = 4, REG_MODE = 6, REG_COMMAND, REG_STATUS, REG_READ_TIMER, REG_WRITE_TIMER };
 
@@ -23,9 +24,8 @@ enum { REG_ACC = 0, REG_VEL = 2, REG_POS = 4, REG_MODE = 6, REG_COMMAND, REG_STA
 #define MODE_18_BIT   0x400u
 #define MODE_COMMAND  0x1000u
 #define MODE_DISABLED 0x3C9u /* clears the overflow flags */
-#define TIMER_ENABLE  0x8000u
-#define TIMER_SHIFT   12
-#define TIMER_MAX     4
+
+#define SMALLEST_SCALE 1e-6 /* as for step generators */
 
 enum kind { POSITION, VELOCITY, ACCELERATION, KINDS };
 
@@ -33,7 +33,9 @@ struct axis {
     hm2_float_t *command[KINDS], *scale, *position_fb, *velocity_fb;
     hm2_bit_t *mode_18_bit, *command_mode, *position_overflow, *velocity_overflow;
     hm2_u32_t *control, *command_word;
-    double seen[KINDS], seen_scale;
+    double seen[KINDS];
+    /* One each: what is sent for one interface must not order another to where it once was. */
+    struct hm2_section values[KINDS];
 };
 
 struct galvo {
@@ -44,12 +46,9 @@ struct galvo {
 };
 
 struct xy2mod {
-    hm2_s32_t *read_timer, *write_timer;
-    int32_t for_read, for_write;
-    bool has_timers;
+    struct hm2_timer read_timer, write_timer;
     double velocity_units, acceleration_units; /* register units for 1 unit/s, 1 unit/s^2 at scale 1 */
     struct hm2_window velocities[AXES], positions[AXES], modes, statuses, modes_out, commands_out;
-    struct hm2_section values[KINDS][AXES], timers[2];
     struct galvo galvo[];
 };
 
@@ -74,9 +73,9 @@ struct xy2mod {
             "1: the velocity has reached its limit")
 
 static const struct hm2_point timer_points[] = {
-    HM2_POINT(struct xy2mod, read_timer, "read-timer-number", HM2_S32, HM2_PIN_IN, -1, "",
+    HM2_POINT(struct xy2mod, read_timer.number, "read-timer-number", HM2_S32, HM2_PIN_IN, -1, "",
               "DPLL timer that samples what is read, 0 to 4; -1 = none"),
-    HM2_POINT(struct xy2mod, write_timer, "write-timer-number", HM2_S32, HM2_PIN_IN, -1, "",
+    HM2_POINT(struct xy2mod, write_timer.number, "write-timer-number", HM2_S32, HM2_PIN_IN, -1, "",
               "DPLL timer that applies what was written, 0 to 4; -1 = none"),
 };
 
@@ -102,37 +101,47 @@ static const char *output_name(const struct hm2_pd *const pd)
     return number < sizeof names / sizeof names[0] ? names[number] : NULL;
 }
 
+static const char *const command_names[KINDS][AXES] = {
+    [POSITION] = {"posx-cmd", "posy-cmd"},
+    [VELOCITY] = {"velx-cmd", "vely-cmd"},
+    [ACCELERATION] = {"accx-cmd", "accy-cmd"},
+};
+
 /* ---- arithmetic ----------------------------------------------------------------------------------------------------
  */
 
-static double scale_of(const struct axis *const axis, const struct hm2_module *const module, const unsigned number)
+/* Of axis a of an interface. */
+static double scale_of(const struct axis *const axis, const struct hm2_module *const module, const unsigned number,
+                       const unsigned a)
 {
+    static const char *const names[AXES] = {"posx-scale", "posy-scale"};
     const double scale = *axis->scale;
-    if (isfinite(scale) && scale != 0.0)
+    if (isfinite(scale) && fabs(scale) >= SMALLEST_SCALE)
         return scale;
-    hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, "scale", number, scale);
-    return *axis->scale = 1.0;
+    hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, names[a], number, scale);
+    return *axis->scale = scale < 0.0 ? -1.0 : 1.0;
 }
 
-static int32_t limited(const struct hm2_module *const module, const unsigned number, const double value,
-                       const int32_t limit)
+/* How a command becomes register units at scale 1, and what the register takes. */
+static double units_of(const struct xy2mod *const ctx, const enum kind kind, const double command, const double scale)
 {
-    const int32_t all = hm2_trunc_s32(value);
-    if (all <= limit && all >= -limit)
-        return all;
-    hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, "command", number, value);
-    return all < 0 ? -limit : limit;
-}
-
-static int32_t value_of(const struct hm2_module *const module, const unsigned number, const enum kind kind,
-                        const double command, const double scale)
-{
-    const struct xy2mod *const ctx = module->context;
     if (kind == POSITION)
-        return limited(module, number, command * FULL_SCALE / scale, POSITION_MAX);
-    if (kind == VELOCITY)
-        return limited(module, number, command * scale * ctx->velocity_units, VELOCITY_MAX);
-    return limited(module, number, command * scale * ctx->acceleration_units, INT32_MAX);
+        return command * FULL_SCALE / scale;
+    return command * scale * (kind == VELOCITY ? ctx->velocity_units : ctx->acceleration_units);
+}
+
+static uint32_t value_of(const struct hm2_module *const module, const unsigned number, const unsigned a,
+                         const enum kind kind, const double scale)
+{
+    static const int32_t limits[KINDS] = {
+        [POSITION] = POSITION_MAX, [VELOCITY] = VELOCITY_MAX, [ACCELERATION] = INT32_MAX};
+    const struct xy2mod *const ctx = module->context;
+    const double command = *ctx->galvo[number].axis[a].command[kind];
+    const int32_t all = hm2_trunc_s32(units_of(ctx, kind, command, scale)), limit = limits[kind];
+    if (all <= limit && all >= -limit)
+        return (uint32_t)all;
+    hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, command_names[kind][a], number, command);
+    return (uint32_t)(all < 0 ? -limit : limit);
 }
 
 /* ---- cycle ---------------------------------------------------------------------------------------------------------
@@ -146,7 +155,7 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
         const struct galvo *const g = &ctx->galvo[i];
         const uint32_t mode = hm2_window_get(&ctx->modes, i);
         for (unsigned a = 0; a < AXES; a++) {
-            const double scale = scale_of(&g->axis[a], module, i);
+            const double scale = scale_of(&g->axis[a], module, i, a);
             *g->axis[a].position_fb = (int32_t)hm2_window_get(&ctx->positions[a], i) / FULL_SCALE / scale;
             *g->axis[a].velocity_fb = (int32_t)hm2_window_get(&ctx->velocities[a], i) / ctx->velocity_units / scale;
             *g->axis[a].position_overflow = mode & OVERFLOW_POS << a;
@@ -156,36 +165,32 @@ static void unpack(struct hm2_module *const module, const struct hm2_cycle *cons
     }
 }
 
+/* A new scale acts on what is commanded from then on: the module has moved on, and must not jump back. */
 static void send_commands(struct axis *const axis, const struct hm2_module *const module, const unsigned number,
                           const unsigned a)
 {
-    struct xy2mod *const ctx = module->context;
-    const double scale = scale_of(axis, module, number);
+    const double scale = scale_of(axis, module, number, a);
     for (unsigned kind = 0; kind < KINDS; kind++) {
         const double command = *axis->command[kind];
         if (!isfinite(command)) {
-            hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, "command", number, command);
+            hm2_notice_point(module, HM2_NOTICE_VALUE_INVALID, command_names[kind][a], number, command);
             continue; /* as before */
         }
-        if (command == axis->seen[kind] && scale == axis->seen_scale)
+        if (command == axis->seen[kind])
             continue;
         axis->seen[kind] = command;
-        struct hm2_section *const section = &ctx->values[kind][a];
-        hm2_section_set(section, number, (uint32_t)value_of(module, number, (enum kind)kind, command, scale));
-        hm2_section_touch(section); /* the module has moved on: the same position again is another order */
+        hm2_section_set(&axis->values[kind], 0, value_of(module, number, a, (enum kind)kind, scale));
+        hm2_section_touch(&axis->values[kind]); /* the same position again is another order, as the module has moved */
     }
-    axis->seen_scale = scale;
 }
 
-static void rest(const struct axis *const axis, const struct hm2_module *const module, const unsigned number,
-                 const unsigned a)
+static void rest(struct axis *const axis, const bool was_enabled)
 {
-    struct xy2mod *const ctx = module->context;
     for (unsigned kind = 0; kind < KINDS; kind++) {
         *axis->command[kind] = 0.0;
-        hm2_section_set(&ctx->values[kind][a], number, 0);
-        if (ctx->galvo[number].enabled) /* the module has moved on since a 0 was sent */
-            hm2_section_touch(&ctx->values[kind][a]);
+        hm2_section_set(&axis->values[kind], 0, 0);
+        if (was_enabled) /* the module has moved on since a 0 was sent */
+            hm2_section_touch(&axis->values[kind]);
     }
 }
 
@@ -193,17 +198,6 @@ static uint32_t axis_mode(const struct axis *const axis, const unsigned a)
 {
     return (*axis->control & CONTROL_MASK) << 3 * a | (*axis->mode_18_bit ? MODE_18_BIT << a : 0) |
            (*axis->command_mode ? MODE_COMMAND << a : 0);
-}
-
-static uint32_t timer_word(hm2_s32_t *const pin, const char *const name, const struct hm2_module *const module,
-                           int32_t *const seen)
-{
-    if (*pin < -1 || *pin > TIMER_MAX) {
-        hm2_notice_point(module, HM2_NOTICE_VALUE_CLAMPED, name, HM2_NO_INSTANCE, *pin);
-        *pin = -1;
-    }
-    *seen = *pin;
-    return *seen < 0 ? 0 : TIMER_ENABLE | (uint32_t)*seen << TIMER_SHIFT;
 }
 
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
@@ -219,7 +213,7 @@ static void pack(struct hm2_module *const module, const struct hm2_cycle *const 
             if (begins)
                 axis->seen[POSITION] = axis->seen[VELOCITY] = axis->seen[ACCELERATION] = NAN;
             if (!enabled) {
-                rest(axis, module, i, a);
+                rest(axis, g->enabled);
                 continue;
             }
             send_commands(axis, module, i, a);
@@ -230,13 +224,8 @@ static void pack(struct hm2_module *const module, const struct hm2_cycle *const 
         hm2_window_set(&ctx->modes_out, i, mode);
         hm2_window_set(&ctx->commands_out, i, command);
     }
-    if (!ctx->has_timers)
-        return;
-    if (*ctx->read_timer != ctx->for_read)
-        hm2_section_set(&ctx->timers[0], 0, timer_word(ctx->read_timer, "read-timer-number", module, &ctx->for_read));
-    if (*ctx->write_timer != ctx->for_write)
-        hm2_section_set(&ctx->timers[1], 0,
-                        timer_word(ctx->write_timer, "write-timer-number", module, &ctx->for_write));
+    hm2_timer_pack(&ctx->read_timer, module);
+    hm2_timer_pack(&ctx->write_timer, module);
 }
 
 /* ---- set-up --------------------------------------------------------------------------------------------------------
@@ -269,12 +258,15 @@ static int add_writes(struct xy2mod *const ctx, const struct hm2_module *const m
     if (!err)
         err = hm2_plan_add_write(setup->plan, &ctx->commands_out, HM2_RANK_NORMAL, hm2_md_address(md, REG_COMMAND, 0),
                                  n, setup->diag);
-    for (unsigned i = 0; i < KINDS * AXES && !err; i++)
-        err = hm2_plan_add_setup(setup->plan, &ctx->values[i / AXES][i % AXES], HM2_RANK_NORMAL,
-                                 hm2_md_address(md, first[i / AXES] + i % AXES, 0), n, 0, setup->diag);
-    for (unsigned i = 0; i < 2 && ctx->has_timers && !err; i++)
-        err = hm2_plan_add_setup(setup->plan, &ctx->timers[i], HM2_RANK_NORMAL,
-                                 hm2_md_address(md, REG_READ_TIMER + i, 0), 1, 0, setup->diag);
+    for (unsigned i = 0; i < n * KINDS * AXES && !err; i++) {
+        const unsigned galvo = i / (KINDS * AXES), kind = i / AXES % KINDS, a = i % AXES;
+        err = hm2_plan_add_setup(setup->plan, &ctx->galvo[galvo].axis[a].values[kind], HM2_RANK_NORMAL,
+                                 hm2_md_address(md, first[kind] + a, galvo), 1, 0, setup->diag);
+    }
+    if (!err && ctx->read_timer.number)
+        err = hm2_timer_add(&ctx->read_timer, module, setup, REG_READ_TIMER);
+    if (!err && ctx->write_timer.number)
+        err = hm2_timer_add(&ctx->write_timer, module, setup, REG_WRITE_TIMER);
     return err;
 }
 
@@ -291,10 +283,10 @@ static int setup(struct hm2_module *const module, struct hm2_setup *const setup_
     const double clock_hz = module->md->clock_hz;
     ctx->velocity_units = VELOCITY_STEP * 2147483648.0 / clock_hz;
     ctx->acceleration_units = ACCEL_STEP * 4294967296.0 * 32768.0 / (clock_hz * clock_hz * VELOCITY_STEP);
-    ctx->has_timers = setup_->has_dpll;
-    ctx->for_read = ctx->for_write = -1;
+    ctx->read_timer.name = "read-timer-number";
+    ctx->write_timer.name = "write-timer-number";
     int err = hm2_claim_pins(module, setup_, HM2_GTAG_NONE, module->instances, false, NULL);
-    if (!err && ctx->has_timers)
+    if (!err && setup_->has_dpll)
         err = hm2_bind_group(setup_, &groups[GROUP_TIMERS], ctx, 0);
     for (unsigned i = 0; !err && i < module->instances; i++)
         err = hm2_bind_group(setup_, &groups[GROUP_ALWAYS], &ctx->galvo[i], i);

@@ -154,6 +154,8 @@ static struct limit parse_limit(const char *const text)
 static bool within(const double a, const double b, const struct limit *const limit)
 {
     const double difference = fabs(a - b);
+    if (!isfinite(a) || !isfinite(b))
+        return isnan(a) ? isnan(b) : a == b;
     return difference <= limit->amount || difference <= limit->share * fmax(fabs(a), fabs(b));
 }
 

@@ -41,7 +41,7 @@ static void pulse_lengths_follow_the_formula(void **state)
         rig_cycle(rig);
         assert_int_equal(rig_written(rig, 0x9D04), rows[i].value);
     }
-    assert_true(rig_get(rig, "rcpwmgen.01.width") == 0.0); /* what was negative is rewritten */
+    assert_true(rig_get(rig, "rcpwmgen.01.width") == -1.0); /* it belongs to whoever drives it */
     rig_set(rig, "rcpwmgen.01.offset", 1.5);
     rig_set(rig, "rcpwmgen.01.scale", 90);
     rig_set(rig, "rcpwmgen.01.width", 45);
@@ -50,6 +50,24 @@ static void pulse_lengths_follow_the_formula(void **state)
     rig_set(rig, "rcpwmgen.01.scale", 0);
     rig_cycle(rig);
     assert_true(rig_get(rig, "rcpwmgen.01.scale") == 1.0);
+    rig_free(rig);
+}
+
+static void a_servo_keeps_its_width_while_the_offset_makes_it_impossible(void **state)
+{
+    (void)state;
+    static const struct {
+        double offset;
+        uint32_t value;
+    } rows[] = {{-1, 0x10000}, {20, 65535}, {NAN, 0x10000}, {1, 7499}};
+    struct module_rig *const rig = started(&hm2_rcpwmgen_type, "");
+    rig_set(rig, "rcpwmgen.00.width", 0.2);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        rig_set(rig, "rcpwmgen.00.offset", rows[i].offset);
+        rig_cycles(rig, 3);
+        assert_int_equal(rig_written(rig, 0x9D00), rows[i].value);
+        assert_true(rig_get(rig, "rcpwmgen.00.width") == 0.2);
+    }
     rig_free(rig);
 }
 
@@ -301,8 +319,51 @@ static void feedback_status_and_timers_of_a_galvo(void **state)
     assert_true(rig_get(rig, "xy2mod.00.velx-overflow") == 0 && rig_get(rig, "xy2mod.00.vely-overflow") == 1);
     assert_true(rig_get(rig, "xy2mod.00.status") == 0xABCDE);
     assert_int_equal(rig_written(rig, 0x9B00), 0xA000);
-    assert_int_equal(rig_written(rig, 0x9C00), 0);
-    assert_true(rig_get(rig, "xy2mod.write-timer-number") == -1);
+    assert_int_equal(rig_written(rig, 0x9C00), 0x8000); /* as for step generators: no such timer is the reference */
+    assert_true(rig_get(rig, "xy2mod.write-timer-number") == 0);
+    rig_free(rig);
+}
+
+static void a_scale_that_divides_by_almost_nothing_is_replaced(void **state)
+{
+    (void)state;
+    static const struct {
+        double wanted, taken;
+    } rows[] = {{0, 1}, {9e-7, 1}, {-9e-7, -1}, {NAN, 1}, {INFINITY, 1}, {-INFINITY, -1}, {1e-6, 1e-6}, {-2, -2}};
+    struct module_rig *const rig = started(&hm2_xy2mod_type, "");
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        rig_set(rig, "xy2mod.00.posy-scale", rows[i].wanted);
+        rig_cycle(rig);
+        assert_true(rig_get(rig, "xy2mod.00.posy-scale") == rows[i].taken);
+    }
+    rig_free(rig);
+}
+
+/* It may be moving by its velocity: an old position sent again would throw it back. */
+static void a_galvo_gets_no_old_position_again(void **state)
+{
+    (void)state;
+    struct module_rig *const rig = started(&hm2_xy2mod_type, "");
+    rig_set(rig, "xy2mod.00.enable", 1);
+    rig_set(rig, "xy2mod.01.enable", 1);
+    rig_set(rig, "xy2mod.00.posx-cmd", 0.25);
+    rig_set(rig, "xy2mod.01.velx-cmd", 10);
+    rig_cycles(rig, 3);
+    rig_set(rig, "xy2mod.00.posx-cmd", 0.5);
+    rig_cycle(rig);
+    assert_true(rig_wrote(rig, 0x9600)); /* its neighbour's */
+    assert_false(rig_wrote(rig, 0x9604));
+    assert_false(rig_wrote(rig, 0x9404));
+    rig_set(rig, "xy2mod.01.posx-scale", 2);
+    rig_cycle(rig);
+    assert_false(rig_wrote(rig, 0x9604));
+    rig_set(rig, "xy2mod.00.enable", 0);
+    rig_cycle(rig);
+    assert_true(rig_wrote(rig, 0x9600));
+    assert_false(rig_wrote(rig, 0x9604));
+    rig_set(rig, "xy2mod.01.posx-cmd", 0.5); /* with the new scale */
+    rig_cycle(rig);
+    assert_int_equal(rig_written(rig, 0x9604), 0x1FFFFFFF);
     rig_free(rig);
 }
 
@@ -393,7 +454,7 @@ static void turns_are_counted_and_velocity_follows_the_excitation(void **state)
     rig_free(rig);
 }
 
-static void index_reset_and_position_file_of_a_resolver(void **state)
+static void index_and_reset_of_a_resolver(void **state)
 {
     (void)state;
     struct module_rig *const rig = started(&hm2_resolver_type, "");
@@ -409,14 +470,55 @@ static void index_reset_and_position_file_of_a_resolver(void **state)
     rig_set(rig, "resolver.00.reset", 1);
     rig_cycle(rig);
     assert_true(rig_get(rig, "resolver.00.position") == 0.0);
-    rig_set(rig, "resolver.00.reset", 0);
+    rig_free(rig);
+}
+
+/* As LinuxCNC does it: joint = position of the file + position of the resolver. */
+static void the_position_file_gives_a_joint_its_place_back(void **state)
+{
+    (void)state;
+    static const struct {
+        double scale, file, place; /* when LinuxCNC ended, and of the motor now */
+    } rows[] = {{1, 7.3, 7.4}, {1, -7.3, -7.4}, {-3.5, 12, 13}, {20, 5, 1},
+                {1, 2.9, 3.1}, {1, 0, 0.125},   {0.5, 1e9, 1e9}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct module_rig *const rig = started(&hm2_resolver_type, "");
+        const double turns = rows[i].place / rows[i].scale;
+        rig_set(rig, "resolver.00.scale", rows[i].scale);
+        rig_set(rig, "resolver.00.use-position-file", 1);
+        rig_put(rig, 0x4000, (uint32_t)((turns - floor(turns)) * 4294967295.0));
+        for (unsigned cycle = 0; cycle < 4900; cycle++)
+            rig_cycle(rig);
+        assert_true(rig_get(rig, "resolver.00.position") == 0.0);
+        assert_true(rig_get(rig, "resolver.00.use-position-file") == 1);
+        rig_set(rig, "resolver.00.joint-pos-fb", rows[i].file);
+        for (unsigned cycle = 0; cycle < 200; cycle++)
+            rig_cycle(rig);
+        assert_true(rig_get(rig, "resolver.00.use-position-file") == 0);
+        assert_true(fabs(rows[i].file + rig_get(rig, "resolver.00.position") - rows[i].place) < 1e-6);
+        rig_free(rig);
+    }
+}
+
+static void an_impossible_joint_position_is_not_taken(void **state)
+{
+    (void)state;
+    static const double joints[] = {NAN, INFINITY, -INFINITY};
+    struct module_rig *const rig = started(&hm2_resolver_type, "");
     rig_set(rig, "resolver.00.use-position-file", 1);
-    rig_cycle(rig);
-    assert_true(rig_get(rig, "resolver.00.use-position-file") == 1);
-    rig_set(rig, "resolver.00.joint-pos-fb", 7.3);
+    rig_put(rig, 0x4000, 0x40000000);
+    rig_put(rig, 0x3E00, 1);
+    for (size_t i = 0; i < sizeof joints / sizeof joints[0]; i++) {
+        rig_set(rig, "resolver.00.joint-pos-fb", joints[i]);
+        rig_cycle(rig);
+        assert_true(rig_get(rig, "resolver.00.position") == 0.0);
+        assert_true(rig_get(rig, "resolver.00.use-position-file") == 1);
+        assert_true(rig_get(rig, "resolver.00.error") == 1); /* which is told all the same */
+    }
+    rig_set(rig, "resolver.00.joint-pos-fb", 1e300);
     rig_cycle(rig);
     assert_true(rig_get(rig, "resolver.00.use-position-file") == 0);
-    assert_true(rig_get(rig, "resolver.00.position") == 7.125);
+    assert_true(fabs(rig_get(rig, "resolver.00.position")) <= 1.0);
     rig_free(rig);
 }
 
@@ -452,6 +554,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pulse_lengths_follow_the_formula),
+        cmocka_unit_test(a_servo_keeps_its_width_while_the_offset_makes_it_impossible),
         cmocka_unit_test(the_rate_of_servos_stays_within_its_limits),
         cmocka_unit_test(one_shot_registers_follow_their_pins),
         cmocka_unit_test(one_shot_control_is_made_of_bits),
@@ -461,10 +564,14 @@ int main(void)
         cmocka_unit_test(a_simulated_servo_gets_its_pulses),
         cmocka_unit_test(commands_go_out_when_they_change),
         cmocka_unit_test(feedback_status_and_timers_of_a_galvo),
+        cmocka_unit_test(a_scale_that_divides_by_almost_nothing_is_replaced),
+        cmocka_unit_test(a_galvo_gets_no_old_position_again),
         cmocka_unit_test(a_simulated_galvo_moves_and_tells_its_limits),
         cmocka_unit_test(recorded_positions_are_the_angles_of_the_bench),
         cmocka_unit_test(turns_are_counted_and_velocity_follows_the_excitation),
-        cmocka_unit_test(index_reset_and_position_file_of_a_resolver),
+        cmocka_unit_test(index_and_reset_of_a_resolver),
+        cmocka_unit_test(the_position_file_gives_a_joint_its_place_back),
+        cmocka_unit_test(an_impossible_joint_position_is_not_taken),
         cmocka_unit_test(an_index_is_found_every_few_turns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -197,6 +197,31 @@ static void values_go_both_ways(void **state)
     assert_true(servo_get(f, "sserial.port-0.doit-us") > 100 && servo_get(f, "sserial.port-0.doit-us") < 1000);
 }
 
+static void impossible_analog_outputs_are_limited_or_zero(void **state)
+{
+    static const struct {
+        double value, min, max, scale, volts;
+    } rows[] = {
+        {5, 8, 2, 10, 8},        {1, 8, 2, 10, 8},           {9, 8, 2, 10, 8}, /* crossed limits: the lower one counts
+                                                                                */
+        {20, -1e9, 1e9, 10, 10}, {-20, -1e9, 1e9, 10, -10},  {3, -10, 10, 0, 0},   {3, -10, 10, NAN, 0},
+        {NAN, 2, 10, 10, 0},     {INFINITY, -10, 10, 10, 0}, {3, NAN, NAN, 10, 3}, {5, -10, 10, -10, -5},
+    };
+    struct servo_rig *const f = *state;
+    plug(f);
+    servo_load(f, "sserial_port_0=30xxxxxx");
+    run(f);
+    servo_set(f, "7i77.0.1.analogena", 1);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        servo_set(f, "7i77.0.1.analogout0-minlim", rows[i].min);
+        servo_set(f, "7i77.0.1.analogout0-maxlim", rows[i].max);
+        servo_set(f, "7i77.0.1.analogout0-scalemax", rows[i].scale);
+        servo_set(f, "7i77.0.1.analogout0", rows[i].value);
+        servo_cycles(f, 4);
+        assert_true(fabs(at_remote(f, ANALOG, "AnalogOut0") - rows[i].volts) < 0.005);
+    }
+}
+
 /* A host may link a pin at any time, to a signal that has another level. */
 static void inputs_that_never_change_are_written_in_turns(void **state)
 {
@@ -639,6 +664,7 @@ int main(void)
         TEST(channels_that_nobody_asked_for_are_passed_over_in_silence),
         TEST(serial_numbers_name_remotes_on_request),
         TEST(values_go_both_ways),
+        TEST(impossible_analog_outputs_are_limited_or_zero),
         TEST(inputs_that_never_change_are_written_in_turns),
         TEST(a_counter_accumulates_past_its_width),
         TEST(run_stops_and_starts_the_port),

@@ -2,6 +2,8 @@
 /* The scripts of tests/system/check_dropin_behaviour.c. */
 #include "scenario.h"
 
+#include <math.h>
+
 #include <hm2/idrom.h>
 
 /* Input pins (register map 4.1; lib/sim/sim_inm.c). */
@@ -17,12 +19,16 @@ enum {
 #define LOCKED 250 /* cycle in which the DPLL has found its phase, whatever the load took */
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
-#define SCENARIO(script, on, with, length, ...)                                                                  \
+#define NAMED_SCENARIO(called, script, on, with, length, ...)                                                    \
     {                                                                                                            \
-        .name = #script, .card = on, .config = with, .cycles = length, .settings = script##_settings,            \
+        .name = called, .card = on, .config = with, .cycles = length, .settings = script##_settings,             \
         .setting_count = COUNT(script##_settings), .waves = script##_waves, .wave_count = COUNT(script##_waves), \
         .events = script##_events, .event_count = COUNT(script##_events), __VA_ARGS__                            \
     }
+#define SCENARIO(script, on, with, length, ...) NAMED_SCENARIO(#script, script, on, with, length, __VA_ARGS__)
+/* The script `settings` for what a card has, or a firmware image. */
+#define SETTINGS(of, script, on, with, ...) \
+    NAMED_SCENARIO("settings-" of, script, on, with, 2560, .settle = 64, __VA_ARGS__)
 
 #define STEPGEN(n, scale, velocity, acceleration, len, space)                            \
     {0, "stepgen." n ".position-scale", scale}, {0, "stepgen." n ".maxvel", velocity},   \
@@ -304,6 +310,10 @@ static const struct setting resolver_settings[] = {
     {400, "resolver.05.index-divisor", 3},
     {400, "resolver.05.index-enable", 1},
     {600, "resolver.excitation-khz", 5},
+    {650, "resolver.03.use-position-file", 1},
+    {650, "resolver.04.use-position-file", 1},
+    {660, "resolver.03.joint-pos-fb", 7.3},
+    {670, "resolver.04.joint-pos-fb", -12.8},
     {800, "resolver.excitation-khz", 2},
     {900, "resolver.excitation-khz", 9},
 };
@@ -765,12 +775,87 @@ static const char *const settings_keeps[] = {
     "io_error",                 /* the same */
     "rtt-reset",                /* the same */
     "watchdog.timeout_ns",      /* it would bite */
-    "encoder.sample-frequency", /* LinuxCNC's driver divides by it: 0 ends the process */
+    "encoder.sample-frequency", /* LinuxCNC's driver divides by it, and by what it becomes: that ends the process */
     "stepgen.??.step_type",     /* LinuxCNC's driver writes beyond its memory for long tables */
     "stepgen.??.enable",        /* nothing shall move */
     "raw.write_*",              /* no register that either does not know of */
     NULL,
 };
+
+/* ---- the same for the settings of other modules, without those that the first cards have shown; what a draw does not
+ * bring comes after the last one */
+
+static const struct setting others_settings[] = {
+    {0, "watchdog.timeout_ns", 100000000},
+};
+
+static const struct setting drives_impossible_settings[] = {
+    {0, "watchdog.timeout_ns", 100000000}, {2500, "xy2mod.00.enable", 1},
+    {2500, "xy2mod.00.posx-scale", 1e-7},  {2500, "xy2mod.00.posy-scale", -1e-7},
+    {2500, "xy2mod.00.posx-cmd", 0.5},     {2500, "xy2mod.00.posy-cmd", NAN},
+    {2500, "xy2mod.00.velx-cmd", 0},       {2500, "xy2mod.00.vely-cmd", 0},
+    {2500, "xy2mod.00.accx-cmd", 0},       {2500, "xy2mod.00.accy-cmd", INFINITY},
+    {2500, "xy2mod.read-timer-number", 5}, {2500, "xy2mod.write-timer-number", -2},
+    {2500, "rcpwmgen.00.scale", 0},        {2500, "rcpwmgen.01.width", NAN},
+    {2550, "3pwmgen.frequency", 0},
+};
+
+static const struct wave others_waves[] = {
+    {"led.CR03", WAVE_SQUARE, 0.5, 0.5, 100, 0, 2560},
+};
+
+static const struct event others_events[] = {
+    {1, 0, PAD, 3, SIM_LOW, 0, 0},
+};
+
+#define drives_impossible_waves  others_waves
+#define drives_impossible_events others_events
+
+/* A multiplexed encoder turns, at the full sample frequency. */
+static const struct event turning_events[] = {
+    {1, 2560, TURN, 0, 3, 0, 0},
+};
+
+#define turning_settings others_settings
+#define turning_waves    others_waves
+
+static const struct setting sensors_settings[] = {
+    {0, "watchdog.timeout_ns", 100000000}, {0, "dpll.01.timer-us", -300},  {0, "dpll.02.timer-us", -400},
+    {0, "dpll.03.timer-us", -250},         {0, "dpll.04.timer-us", -200},  {0, "ssi.00.timer-number", 1},
+    {0, "ssi.01.timer-number", 2},         {0, "biss.01.timer-number", 1},
+};
+
+static const struct event sensors_events[] = {
+    {0, 2560, ABSOLUTE, HM2_GTAG_SSI, 0, 30, 1234567},
+    {0, 2560, ABSOLUTE_GRAY, HM2_GTAG_SSI, 1, 25, -37},
+    {0, 2560, ABSOLUTE, HM2_GTAG_BISS, 1, 30, 4321},
+};
+
+#define sensors_waves others_waves
+
+static const struct setting fanucs_settings[] = {
+    {0, "watchdog.timeout_ns", 100000000}, {0, "dpll.01.timer-us", -300}, {0, "dpll.02.timer-us", -400},
+    {0, "dpll.03.timer-us", -350},         {0, "dpll.04.timer-us", -450}, {0, "fanuc.00.timer-number", 1},
+    {0, "fanuc.01.timer-number", 1},
+};
+
+static const struct event fanucs_events[] = {
+    {0, 2560, ABSOLUTE, HM2_GTAG_FABS, 0, 76, 10000001},
+    {0, 2560, ABSOLUTE, HM2_GTAG_FABS, 1, 76, 1000001},
+};
+
+#define fanucs_waves others_waves
+
+/* Slow three-phase PWM is simulated clock by clock; LinuxCNC's driver divides by counts-per-rev and by what it makes of
+ * frequency-khz. */
+#define OTHERS_KEEP                                                                                          \
+    "packet-*", "io_error", "rtt-reset", "watchdog.timeout_ns", "dpll.*", "gpio.*", "stepgen.*", "pwmgen.*", \
+        "sserial.*", "*.invert_output", "*.is_opendrain", "3pwmgen.??.phase*", "resolver.??.refpdm*",        \
+        "3pwmgen.frequency", "*.counts-per-rev", "*.frequency-khz"
+
+static const char *const others_keeps[] = {OTHERS_KEEP, NULL};
+static const char *const turning_keeps[] = {OTHERS_KEEP, "encoder.muxed-sample-frequency", "encoder.timer-number",
+                                            NULL};
 
 const struct scenario scenarios[] = {
     SCENARIO(motion, "7i96s", "num_stepgens=5", 2000,
@@ -791,6 +876,20 @@ const struct scenario scenarios[] = {
              .firmware = TEST_DATA "/firmware/latch_48.hex"),
     SCENARIO(settings, "7i93", "", 2560, .settle = 64, .keeps = settings_keeps,
              .firmware = TEST_DATA "/firmware/inmux_48.hex"),
+    SETTINGS("drives", drives_impossible, "7i93", "num_resolvers=0 num_oneshots=0", .keeps = others_keeps,
+             .firmware = TEST_DATA "/firmware/drives_29_48.hex"),
+    SETTINGS("7i65", turning, "7i93_2x7i65", "", .keeps = turning_keeps, .has_7i65 = true),
+    SETTINGS("7i48", others, "7i93_sv12im_2x7i48", "", .keeps = others_keeps),
+    SETTINGS("shots", others, "7i93", "num_resolvers=0 num_3pwmgens=0 num_rcpwmgens=0 num_xy2mods=0",
+             .keeps = others_keeps, .firmware = TEST_DATA "/firmware/drives_29_48.hex"),
+    SETTINGS("7i49", others, "7i93_sv6_7i49", "", .keeps = others_keeps),
+    SETTINGS("absolute", sensors, "7i93",
+             "ssi_chan_0=a%12ub%3fc%1b%2pd%12s ssi_chan_1=pos%25ge biss_chan_1=turns%18lturns%12h",
+             .keeps = others_keeps, .firmware = TEST_DATA "/firmware/absolute_48.hex", .from = LOCKED),
+    SETTINGS("fanuc", fanucs, "7i93", "fanuc_chan_0=AA64 fanuc_chan_1=low%16umiddle%32shigh%28u", .keeps = others_keeps,
+             .firmware = TEST_DATA "/firmware/absolute_48.hex", .sources = SIM_SOURCES_2021, .from = LOCKED),
+    SETTINGS("7i77", others, "7i96s_7i77d", "sserial_port_0=30xxxxxx", .keeps = others_keeps, .remote = "7i77",
+             .paced = true, .from = 60),
     SCENARIO(ports, "7i80hd-16", "", 1280, .settle = 64, .keeps = settings_keeps, .reached = {{"gpio.071.in", 1}}),
     SCENARIO(octal, "7i93_2x7i65", "", 1200, .has_7i65 = true,
              .reached = {{"7i65.volts.0", 9.99},
