@@ -83,6 +83,7 @@ struct hm2_plan {
     uint32_t request_seq;
     uint64_t requests;        /* sent so far */
     uint64_t requests_before; /* those that an earlier layout made */
+    uint64_t turns;           /* those that were turns */
     uint64_t late_request;    /* what the last late reply answers; 0: nothing that can be read */
     uint64_t answered;        /* bit n: the n-th request before the last one got its answer */
     bool outstanding;
