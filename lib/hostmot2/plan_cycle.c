@@ -213,7 +213,8 @@ static void accept(struct hm2_plan *const plan)
     settle_session(plan, hm2_get_le32(trailer + PLAN_TRAILER_SESSION));
 }
 
-/* One more reply to the request that was answered last, with another count of packets: the card carried it out twice. */
+/* One more reply to the request that was answered last, with another count of packets: the card carried it out twice.
+ */
 static bool is_second_answer(const struct hm2_plan *const plan)
 {
     const size_t at = plan->reply_len - PLAN_TRAILER_BYTES;

@@ -216,9 +216,9 @@ static void take(struct hm2_serial *const port)
     hm2_section_touch(&p->rx_clear);
 }
 
-static void late(struct hm2_serial *const port, const uint64_t request)
+static bool late(struct hm2_serial *const port, const uint64_t request)
 {
-    pkt_rx_late(&((struct pktuart *)port)->rx, port, request);
+    return pkt_rx_late(&((struct pktuart *)port)->rx, port, request);
 }
 
 /* ---- write ----------------------------------------------------------------------------------------------------------
@@ -396,6 +396,7 @@ const struct hm2_module_type hm2_pktuart_type = {
     .variant_count = sizeof variants / sizeof variants[0],
     .config_count = HM2_CFG_PKTUARTS,
     .setup = setup,
+    .start = serial_start,
     .unpack = serial_unpack,
     .pack = serial_pack,
     .write_lost = serial_write_lost,
