@@ -213,6 +213,13 @@ static void accept(struct hm2_plan *const plan)
     settle_session(plan, hm2_get_le32(trailer + PLAN_TRAILER_SESSION));
 }
 
+/* Its number, when it is remembered and was made in the present layout. */
+static uint64_t readable_request(const struct hm2_plan *const plan, const uint64_t age)
+{
+    const uint64_t number = plan->requests - age;
+    return age < 64 && number > plan->requests_before ? number : 0;
+}
+
 /* One more reply to the request that was answered last, with another count of packets: the card carried it out twice.
  */
 static bool is_second_answer(const struct hm2_plan *const plan)
@@ -235,15 +242,13 @@ enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
         return HM2_REPLY_MALFORMED;
     /* 64 requests are remembered. A reply to an older one counts as late: so old a duplicate is as good as that. */
     const uint64_t bit = age < 64 ? UINT64_C(1) << age : 0;
-    const uint64_t number = plan->requests - age;
-    const bool readable = age < 64 && number > plan->requests_before;
     if ((plan->answered & bit) != 0) {
-        plan->late_request = readable && is_second_answer(plan) ? number : 0;
+        plan->late_request = is_second_answer(plan) ? readable_request(plan, age) : 0;
         return HM2_REPLY_STALE;
     }
     plan->answered |= bit;
     if (age > 0 || !plan->outstanding) {
-        plan->late_request = readable ? number : 0;
+        plan->late_request = readable_request(plan, age);
         return HM2_REPLY_LATE;
     }
     if (is_turn) {
@@ -261,9 +266,15 @@ uint64_t hm2_plan_requests(const struct hm2_plan *const plan)
     return plan->requests;
 }
 
-uint16_t hm2_plan_datagrams(const struct hm2_plan *const plan)
+struct hm2_plan_tally hm2_plan_tally(const struct hm2_plan *const plan)
 {
-    return (uint16_t)(plan->requests - 1u + plan->write_at_request - plan->turns);
+    const uint8_t *const trailer = plan->reply + plan->reply_len - PLAN_TRAILER_BYTES;
+    return (struct hm2_plan_tally){
+        .requests = (uint16_t)(plan->requests - 1u),
+        .writes = (uint16_t)(plan->write_at_request - plan->turns),
+        .came = hm2_get_le16(trailer + PLAN_TRAILER_RX_UDP),
+        .answered = hm2_get_le16(trailer - PLAN_REPLIES_BYTES),
+    };
 }
 
 uint64_t hm2_plan_late_request(const struct hm2_plan *const plan)

@@ -25,6 +25,9 @@ enum {
     PLAN_TRAILER_BYTES = 14,
 };
 
+/* In front of it, when the plan reads queues: the count of replies. */
+enum { PLAN_REPLIES_BYTES = 2 };
+
 /* Commands of our own: word, address and data. */
 enum {
     PLAN_COMMAND_BYTES = 4,         /* word and address of any command */

@@ -177,7 +177,7 @@ static void show_counts(struct hm2_serial *const port)
 
 struct ports {
     bool tallied;
-    uint16_t came, sent; /* datagrams, as of the last good reply (hm2_plan_datagrams()) */
+    struct hm2_plan_tally tally; /* as of the last good reply */
     struct hm2_serial *port[];
 };
 
@@ -249,21 +249,24 @@ void serial_start(struct hm2_module *const module, const struct hm2_cycle *const
         ports->tallied = false;
 }
 
-/* The request before has come, as it had an answer, and so has the write of a plain cycle that is confirmed. When no
- * more have, no other request did. */
-static struct serial_passage look_back(struct ports *const ports, const struct hm2_plan *const plan,
-                                       const struct hm2_cycle *const cycle)
+static unsigned beyond(const unsigned came, const unsigned sent)
 {
-    const struct hm2_plan_facts facts = hm2_plan_facts(plan);
-    const uint16_t all = hm2_plan_datagrams(plan);
-    const uint16_t came = (uint16_t)(facts.card_rx_udp - ports->came), sent = (uint16_t)(all - ports->sent);
-    const unsigned proven = 1u + (!cycle->turned && facts.write_confirmed);
-    const struct serial_passage passage = {.twice = ports->tallied && came > sent ? (unsigned)came - sent : 0,
-                                           .unheard = ports->tallied && came <= proven};
+    return came > sent ? came - sent : 0;
+}
+
+/* The request before was answered. When the card has sent no other reply, no other request has come. */
+static struct serial_passage look_back(struct ports *const ports, const struct hm2_plan *const plan)
+{
+    const struct hm2_plan_tally now = hm2_plan_tally(plan), before = ports->tally;
+    const uint16_t requests = (uint16_t)(now.requests - before.requests),
+                   writes = (uint16_t)(now.writes - before.writes);
+    const uint16_t came = (uint16_t)(now.came - before.came), answered = (uint16_t)(now.answered - before.answered);
+    const bool tallied = ports->tallied;
+    ports->tally = now;
     ports->tallied = true;
-    ports->came = facts.card_rx_udp;
-    ports->sent = all;
-    return passage;
+    return (struct serial_passage){.twice = tallied ? beyond(answered, requests) : 0,
+                                   .writes_twice = tallied ? beyond(beyond(came, answered), writes) : 0,
+                                   .unheard = tallied && answered <= 1u};
 }
 
 /* Whoever sees a stray request knows that one more came, also when another was lost. */
@@ -282,7 +285,9 @@ static void count_twice(struct hm2_serial *const port, const bool turned)
 {
     const bool in_this_turn = turned && !port->held;
     if (port->passage.twice > 0)
-        port->counts.tx_uncertain += port->turned_bytes + (in_this_turn ? 0 : port->sent_bytes);
+        port->counts.tx_uncertain += port->turned_bytes;
+    if (port->passage.writes_twice > 0 && !in_this_turn)
+        port->counts.tx_uncertain += port->sent_bytes;
     port->turned_bytes = in_this_turn ? port->sent_bytes : 0;
 }
 
@@ -320,7 +325,7 @@ void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *cons
         if (!port || !port->awaiting)
             continue;
         if (!looked)
-            passage = look_back(module->context, port->plan, cycle);
+            passage = look_back(module->context, port->plan);
         looked = true;
         port->awaiting = false;
         port->sent_ns = cycle->now_ns;

@@ -79,7 +79,9 @@ struct queue_place queue_place(struct queue *queue, unsigned words, unsigned n);
 /* What a reply tells of the datagrams between it and the good one before: that one's request, and all that were sent
  * after it. */
 struct serial_passage {
-    unsigned twice; /* so many more have come than were sent: one came twice, or somebody else talks to the card */
+    /* So many more have come than were sent: some came twice, or somebody else talks to the card. */
+    unsigned twice;        /* requests, and turns */
+    unsigned writes_twice; /* plain ones */
     bool stray; /* a request was carried out that nobody counts on: what FIFOs show now may not be what was expected */
     bool unheard; /* requests without a reply have not come */
 };

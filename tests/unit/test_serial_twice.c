@@ -16,15 +16,15 @@ struct row {
 };
 
 static const struct row rows[] = {
-    {"SVUA8_8_72", HM2_SERIAL_UART, HM2_GTAG_UART_TX, 115200, HM2_DRIVE_AUTO, 6000, 8, 1},
+    {"SVUA8_8_72", HM2_SERIAL_UART, HM2_GTAG_UART_TX, 115200, HM2_DRIVE_AUTO, 3000, 8, 1},
     {"SVUA8_8_72", HM2_SERIAL_UART, HM2_GTAG_UART_TX, 9600, HM2_DRIVE_AUTO, 1000, 1, 2},
     {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 115200, HM2_DRIVE_AUTO, 6000, 29, 9},
-    {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_DRIVE_ON, 30000, 77, 3},
-    {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_DRIVE_ON, 30000, 77, 3},
+    {"PKTUART_0", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_DRIVE_ON, 12000, 77, 3},
+    {"PKTUART_1", HM2_SERIAL_PKTUART, HM2_GTAG_PKTUART_TX, 1000000, HM2_DRIVE_ON, 12000, 77, 3},
 };
 
 #define ROWS        (sizeof rows / sizeof rows[0])
-#define FAULT_EVERY 50u /* cycles */
+#define FAULT_EVERY 29u /* cycles */
 #define QUIET       60u /* periods without a byte end a test */
 #define HEARD_MAX   65536u
 
@@ -210,6 +210,12 @@ static void all_came(const struct line *const l, const struct hm2_serial_counts 
         fail_with(l, counts);
 }
 
+static void nothing_is_missing(const struct line *const l, const struct hm2_serial_counts *const counts)
+{
+    if ((l->got != l->put && l->heard != l->put) || l->jumps > 0)
+        fail_with(l, counts);
+}
+
 static void all_was_heard(const struct line *const l, const struct hm2_serial_counts *const counts)
 {
     if (l->heard != l->put || counts->tx_uncertain > 0 || counts->tx_bytes != l->put)
@@ -257,6 +263,28 @@ static void nothing_is_uncertain(const struct line *const l, const struct hm2_se
         fail_with(l, counts);
 }
 
+static void a_write_that_is_carried_out_twice_takes_nothing_and_a_request_sends_nothing(void **state)
+{
+    (void)state;
+    each((struct weather){.fault = TWICE, .write = true}, false, receive_all, all_came);
+    each((struct weather){.fault = TWICE}, false, send_all, all_was_heard);
+}
+
+/* Somebody who reads the card's registers. */
+static void a_stranger_costs_nothing(void **state)
+{
+    (void)state;
+    each((struct weather){.fault = STRANGER}, false, send_all, all_was_heard);
+    each((struct weather){.fault = STRANGER, .write = true}, true, receive_all, nothing_is_missing);
+    each((struct weather){.fault = STRANGER, .write = true}, true, send_all, nothing_is_missing);
+}
+
+static void a_request_that_is_lost_makes_nothing_uncertain(void **state)
+{
+    (void)state;
+    each((struct weather){.fault = LOST}, false, receive_all, nothing_is_uncertain);
+}
+
 static void a_turn_that_is_lost_makes_nothing_uncertain(void **state)
 {
     (void)state;
@@ -272,6 +300,9 @@ int main(void)
         cmocka_unit_test(what_a_write_that_comes_twice_sends_again_is_counted),
         cmocka_unit_test(what_a_turn_that_comes_twice_sends_again_is_counted),
         cmocka_unit_test(replies_that_come_twice_cost_nothing),
+        cmocka_unit_test(a_write_that_is_carried_out_twice_takes_nothing_and_a_request_sends_nothing),
+        cmocka_unit_test(a_stranger_costs_nothing),
+        cmocka_unit_test(a_request_that_is_lost_makes_nothing_uncertain),
         cmocka_unit_test(a_turn_that_is_lost_makes_nothing_uncertain),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
