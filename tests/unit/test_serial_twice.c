@@ -292,6 +292,55 @@ static void a_turn_that_is_lost_makes_nothing_uncertain(void **state)
     each((struct weather){.fault = LOST, .write = true}, true, send_all, all_was_heard);
 }
 
+/* ---- frames that are handed over in parts ------------------------------------------------------------------------
+ */
+
+#define LONG_FRAME 600u
+#define FRAMES     60u
+
+/* All bytes of a frame are its number. */
+static void send_frames(struct line *const l)
+{
+    attach(l);
+    for (unsigned idle = 0; idle < QUIET; idle++) {
+        const size_t heard = l->heard;
+        uint8_t bytes[LONG_FRAME];
+        memset(bytes, (int)(l->put / LONG_FRAME), sizeof bytes);
+        if (l->put < FRAMES * LONG_FRAME && hm2_serial_put_frame(l->port, bytes, sizeof bytes) == 0)
+            l->put += sizeof bytes;
+        cycle(l);
+        idle = l->heard > heard ? 0 : idle;
+    }
+}
+
+static unsigned frames_not_whole(const struct line *const l)
+{
+    unsigned bytes[FRAMES] = {0}, wrong = 0;
+    for (size_t i = 0; i < l->heard; i++)
+        if (l->sounds[i] < FRAMES)
+            bytes[l->sounds[i]]++;
+    for (unsigned i = 0; i < FRAMES; i++)
+        wrong += bytes[i] != LONG_FRAME;
+    return wrong;
+}
+
+static void a_part_of_a_frame_that_comes_twice_spoils_no_other_frame(void **state)
+{
+    const struct hm2_serial_settings settings = {
+        .baud = 1000000, .drive = HM2_DRIVE_ON, .frames = true, .tx_gap_bits = 24, .rx_gap_bits = 14};
+    (void)state;
+    for (unsigned pipelined = 0; pipelined < 2; pipelined++) {
+        struct line l = open_line(&rows[ROWS - 1u], (struct weather){.fault = TWICE, .write = true}, pipelined);
+        assert_int_equal(hm2_serial_set(l.port, &settings, &l.bench->diag), 0);
+        send_frames(&l);
+        const unsigned wrong = frames_not_whole(&l), strikes = l.cycle / FAULT_EVERY;
+        const uint32_t uncertain = hm2_serial_counts(l.port).tx_uncertain;
+        if (l.put != FRAMES * LONG_FRAME || wrong > strikes || uncertain < wrong * LONG_FRAME)
+            fail_msg("%zu bytes, %u frames not whole, %u strikes, uncertain %u", l.put, wrong, strikes, uncertain);
+        close_line(&l);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -299,6 +348,7 @@ int main(void)
         cmocka_unit_test(what_a_turn_that_comes_twice_takes_along_is_counted),
         cmocka_unit_test(what_a_write_that_comes_twice_sends_again_is_counted),
         cmocka_unit_test(what_a_turn_that_comes_twice_sends_again_is_counted),
+        cmocka_unit_test(a_part_of_a_frame_that_comes_twice_spoils_no_other_frame),
         cmocka_unit_test(replies_that_come_twice_cost_nothing),
         cmocka_unit_test(a_write_that_is_carried_out_twice_takes_nothing_and_a_request_sends_nothing),
         cmocka_unit_test(a_stranger_costs_nothing),
