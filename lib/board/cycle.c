@@ -111,10 +111,10 @@ bool hm2_board_request_outstanding(const struct hm2_board *const board)
 /* ---- reply --------------------------------------------------------------------------------------------------------
  */
 
+/* What FIFOs gave comes only once: also of a reply that is not waited for. */
 HM2_RARE static void take_late(struct hm2_board *const board)
 {
     const uint64_t request = hm2_plan_late_request(board->plan);
-    count(board->points->late);
     if (request == 0)
         return;
     const int64_t now_ns = link_now_ns(board->link);
@@ -133,8 +133,10 @@ static bool judge(struct hm2_board *const board, const size_t len)
         return true;
     case HM2_REPLY_STALE:
         count(board->points->stale);
+        take_late(board);
         return false;
     case HM2_REPLY_LATE:
+        count(board->points->late);
         take_late(board);
         return false;
     case HM2_REPLY_MALFORMED:

@@ -213,6 +213,23 @@ static void accept(struct hm2_plan *const plan)
     settle_session(plan, hm2_get_le32(trailer + PLAN_TRAILER_SESSION));
 }
 
+/* Its number, when it is remembered and was made in the present layout. */
+static uint64_t readable_request(const struct hm2_plan *const plan, const uint64_t age)
+{
+    const uint64_t number = plan->requests - age;
+    return age < 64 && number > plan->requests_before ? number : 0;
+}
+
+/* One more reply to the request that was answered last, with another count of packets: the card carried it out twice.
+ */
+static bool is_second_answer(const struct hm2_plan *const plan)
+{
+    const size_t at = plan->reply_len - PLAN_TRAILER_BYTES;
+    const uint8_t *const first = plan->reply + at, *const second = plan->landing + at;
+    return hm2_get_le32(first + PLAN_TRAILER_REQUEST) == hm2_get_le32(second + PLAN_TRAILER_REQUEST) &&
+           hm2_get_le16(first + PLAN_TRAILER_RX_UDP) != hm2_get_le16(second + PLAN_TRAILER_RX_UDP);
+}
+
 enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
 {
     bool is_turn = false;
@@ -225,12 +242,13 @@ enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
         return HM2_REPLY_MALFORMED;
     /* 64 requests are remembered. A reply to an older one counts as late: so old a duplicate is as good as that. */
     const uint64_t bit = age < 64 ? UINT64_C(1) << age : 0;
-    if ((plan->answered & bit) != 0)
+    if ((plan->answered & bit) != 0) {
+        plan->late_request = is_second_answer(plan) ? readable_request(plan, age) : 0;
         return HM2_REPLY_STALE;
+    }
     plan->answered |= bit;
     if (age > 0 || !plan->outstanding) {
-        const uint64_t number = plan->requests - age;
-        plan->late_request = age < 64 && number > plan->requests_before ? number : 0;
+        plan->late_request = readable_request(plan, age);
         return HM2_REPLY_LATE;
     }
     if (is_turn) {
@@ -246,6 +264,17 @@ enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
 uint64_t hm2_plan_requests(const struct hm2_plan *const plan)
 {
     return plan->requests;
+}
+
+struct hm2_plan_tally hm2_plan_tally(const struct hm2_plan *const plan)
+{
+    const uint8_t *const trailer = plan->reply + plan->reply_len - PLAN_TRAILER_BYTES;
+    return (struct hm2_plan_tally){
+        .requests = (uint16_t)(plan->requests - 1u),
+        .writes = (uint16_t)(plan->write_at_request - plan->turns),
+        .came = hm2_get_le16(trailer + PLAN_TRAILER_RX_UDP),
+        .answered = hm2_get_le16(trailer - PLAN_REPLIES_BYTES),
+    };
 }
 
 uint64_t hm2_plan_late_request(const struct hm2_plan *const plan)

@@ -25,6 +25,9 @@ enum {
     PLAN_TRAILER_BYTES = 14,
 };
 
+/* In front of it, when the plan reads queues: the count of replies. */
+enum { PLAN_REPLIES_BYTES = 2 };
+
 /* Commands of our own: word, address and data. */
 enum {
     PLAN_COMMAND_BYTES = 4,         /* word and address of any command */
@@ -83,6 +86,7 @@ struct hm2_plan {
     uint32_t request_seq;
     uint64_t requests;        /* sent so far */
     uint64_t requests_before; /* those that an earlier layout made */
+    uint64_t turns;           /* those that were turns */
     uint64_t late_request;    /* what the last late reply answers; 0: nothing that can be read */
     uint64_t answered;        /* bit n: the n-th request before the last one got its answer */
     bool outstanding;

@@ -228,11 +228,19 @@ static int check_overlap(const struct plan_list *const writes, struct hm2_diag *
     return 0;
 }
 
+/* They are sorted to the end. Only their owners ask for the card's count of replies. */
+static bool reads_queues(const struct hm2_plan *const plan)
+{
+    return plan->reads.count > 0 && plan->reads.at[plan->reads.count - 1u].queue;
+}
+
 static int check_sizes(const struct hm2_plan *const plan, const size_t read_bytes, const size_t write_bytes,
                        struct hm2_diag *const diag)
 {
-    const size_t request = PLAN_COMMAND_BYTES * plan->reads.commands + PLAN_REQUEST_BYTES;
-    const size_t reply = read_bytes + PLAN_TRAILER_BYTES;
+    const bool queues = reads_queues(plan);
+    const size_t request =
+        PLAN_COMMAND_BYTES * plan->reads.commands + PLAN_REQUEST_BYTES + (queues ? PLAN_COMMAND_BYTES : 0u);
+    const size_t reply = read_bytes + PLAN_TRAILER_BYTES + (queues ? PLAN_REPLIES_BYTES : 0u);
     const size_t fixed = PLAN_COMMAND_BYTES * plan->writes.commands + write_bytes;
     size_t longest = PLAN_SESSION_BYTES;
     for (unsigned i = 0; i < plan->section_count; i++)
@@ -293,6 +301,8 @@ static int lay_out_reads(struct hm2_plan *const plan)
             at += 4u * list->at[first].words;
         }
     }
+    if (reads_queues(plan))
+        (void)lbp16_add_read16(&builder, LBP16_SPACE_CONTROL, LBP16_CONTROL_TX_UDP, 1, NULL);
     (void)lbp16_add_read16(&builder, LBP16_SPACE_TIMER, PLAN_SCRATCH_REQUEST, PLAN_SCRATCH_WORDS, NULL);
     (void)lbp16_add_read16(&builder, LBP16_SPACE_CONTROL, LBP16_CONTROL_RX_UDP, 1, NULL);
     plan->request_len = builder.used;

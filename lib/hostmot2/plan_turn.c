@@ -69,6 +69,7 @@ static size_t append(struct hm2_plan *const plan, const size_t used, const uint8
 const uint8_t *hm2_plan_turn(struct hm2_plan *const plan, const uint16_t timeout_us, size_t *const len)
 {
     plan->write_before = plan->write_seq;
+    plan->turns++;
     const size_t write_len = plan_compose_write(plan, write_room(plan));
     plan_begin_request(plan);
     hm2_put_le16(plan->turn_wait + PLAN_COMMAND_BYTES, timeout_us);

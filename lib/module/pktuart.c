@@ -48,6 +48,7 @@ struct pktuart {
     uint8_t queue_words[FRAMES];
     unsigned seen; /* by the last reply */
     bool spoilt;   /* words of a frame that will not be sent may be in the card */
+    bool turned;   /* the turn that was answered last had a part of a long frame */
     struct pkt_rx rx;
 };
 
@@ -145,7 +146,7 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
     hm2_section_touch(&p->tx_mode);
     hm2_section_touch(&p->rx_mode);
     p->queued = p->queued_words = p->frame_bytes = 0;
-    p->spoilt = false;
+    p->spoilt = p->turned = false;
     pkt_crowd_init(&p->rx.crowd, s->baud, s->parity != HM2_PARITY_NONE);
     pkt_rx_forget(&p->rx, port);
     return 0;
@@ -202,9 +203,35 @@ static void take_sent(struct pktuart *const p)
     }
 }
 
+/* The frame that is handed over in parts is not sent. */
+static void drop_parts(struct pktuart *const p, const unsigned counted)
+{
+    p->port.counts.tx_uncertain += p->frame_bytes - counted;
+    ring_drop(&p->port.tx, p->frame_bytes - p->given_bytes);
+    if (p->given_bytes < p->frame_bytes)
+        frames_drop(&p->port.tx_frames);
+    p->frame_bytes = 0;
+}
+
+/* A frame of one write that came twice is sent twice. With a part of a longer one whatever follows would be sent in its
+ * place. */
+static void look_for_doubles(struct pktuart *const p)
+{
+    const struct serial_passage *const passage = &p->port.passage;
+    const bool now = p->frame_bytes > WRITE_BYTES;
+    const bool doubled = (passage->twice > 0 && p->turned) || (passage->writes_twice > 0 && now);
+    p->turned = now && p->port.turned_bytes > 0;
+    if (!doubled)
+        return;
+    if (now)
+        drop_parts(p, 0);
+    p->spoilt = true;
+}
+
 static void take(struct hm2_serial *const port)
 {
     struct pktuart *const p = (struct pktuart *)port;
+    look_for_doubles(p);
     take_sent(p);
     const enum pkt_rx_health health = pkt_rx_take(&p->rx, port);
     if (p->rx.clearing)
@@ -216,9 +243,9 @@ static void take(struct hm2_serial *const port)
     hm2_section_touch(&p->rx_clear);
 }
 
-static void late(struct hm2_serial *const port, const uint64_t request)
+static bool late(struct hm2_serial *const port, const uint64_t request)
 {
-    pkt_rx_late(&((struct pktuart *)port)->rx, port, request);
+    return pkt_rx_late(&((struct pktuart *)port)->rx, port, request);
 }
 
 /* ---- write ----------------------------------------------------------------------------------------------------------
@@ -227,16 +254,6 @@ static void late(struct hm2_serial *const port, const uint64_t request)
 static bool tx_set_up(const struct pktuart *const p)
 {
     return hm2_section_confirmed(&p->tx_mode) && hm2_section_confirmed(&p->tx_rate);
-}
-
-/* The frame that is handed over in parts is not sent. */
-static void drop_parts(struct pktuart *const p, const unsigned counted)
-{
-    p->port.counts.tx_uncertain += p->frame_bytes - counted;
-    ring_drop(&p->port.tx, p->frame_bytes - p->given_bytes);
-    if (p->given_bytes < p->frame_bytes)
-        frames_drop(&p->port.tx_frames);
-    p->frame_bytes = 0;
 }
 
 /* A mode comes with a clear: of what the transmitter had nobody knows how much it has sent. */
@@ -396,6 +413,7 @@ const struct hm2_module_type hm2_pktuart_type = {
     .variant_count = sizeof variants / sizeof variants[0],
     .config_count = HM2_CFG_PKTUARTS,
     .setup = setup,
+    .start = serial_start,
     .unpack = serial_unpack,
     .pack = serial_pack,
     .write_lost = serial_write_lost,

@@ -353,12 +353,39 @@ static void take_all(struct pkt_rx *const rx, struct hm2_serial *const port)
     look_at_crowd(rx, port, sizes);
 }
 
+/* What was asked for without an answer is still in the card for certain, or may have been taken from it. */
+static void judge_unanswered(struct pkt_rx *const rx, const struct serial_passage *const passage)
+{
+    if (!passage->unheard) {
+        lose(rx);
+        return;
+    }
+    rx->unheard_request = rx->request;
+    rx->asked_words = rx->asked_counts = 0;
+    rx->unanswered = false;
+}
+
+/* Words and sizes do not belong together any longer when a request has taken some unseen, nor may there have been any
+ * to take, which spoils the buffer. When it is not certain that it was a request which came twice, what it may have
+ * taken is only counted. */
+static bool is_torn(struct pkt_rx *const rx, struct hm2_serial *const port)
+{
+    const bool popped = rx->popped_words > 0 || rx->popped_counts > 0;
+    if (popped && !port->passage.stray)
+        port->counts.rx_uncertain += WORD_BYTES * rx->popped_words * port->passage.twice;
+    rx->popped_request = rx->request;
+    rx->popped_words = rx->asked_words;
+    rx->popped_counts = rx->asked_counts;
+    return port->passage.stray;
+}
+
 enum pkt_rx_health pkt_rx_take(struct pkt_rx *const rx, struct hm2_serial *const port)
 {
-    if (rx->unanswered && rx->doubt.on)
+    const bool torn = is_torn(rx, port);
+    if (!rx->clearing && (torn || (rx->unanswered && rx->doubt.on && !port->passage.unheard)))
         return PKT_RX_LOST;
     if (rx->unanswered)
-        lose(rx);
+        judge_unanswered(rx, &port->passage);
     if (rx->clearing) {
         take_state(rx);
         look_at_crowd(rx, port, 0);
@@ -378,13 +405,17 @@ enum pkt_rx_health pkt_rx_take(struct pkt_rx *const rx, struct hm2_serial *const
     return rx->hunt.on && (crowded || is_hopeless(rx)) ? PKT_RX_LOST : PKT_RX_GOOD;
 }
 
-void pkt_rx_late(struct pkt_rx *const rx, struct hm2_serial *const port, const uint64_t request)
+bool pkt_rx_late(struct pkt_rx *const rx, struct hm2_serial *const port, const uint64_t request)
 {
-    if (rx->clearing || rx->request != request || (rx->asked_words == 0 && rx->asked_counts == 0))
-        return;
+    if (rx->clearing)
+        return true;
+    if (rx->request != request || (rx->asked_words == 0 && rx->asked_counts == 0))
+        return request != rx->unheard_request &&
+               (request != rx->popped_request || (rx->popped_words == 0 && rx->popped_counts == 0));
     port->sent_ns = rx->request_ns;
     take_all(rx, port);
     rx->unanswered = false;
+    return true;
 }
 
 /* ---- request ------------------------------------------------------------------------------------------------------

@@ -43,7 +43,10 @@ struct pkt_rx {
     bool clearing;
     bool skips; /* the oldest frame is the first after a clear: its beginning may be missing */
     unsigned asked_words, asked_counts;
-    uint64_t request; /* in which they were asked for */
+    unsigned popped_words, popped_counts; /* by the request that was answered last */
+    uint64_t popped_request;              /* that one, and */
+    uint64_t unheard_request;             /* one that had not come when a later one was answered */
+    uint64_t request;                     /* in which they were asked for */
     int64_t request_ns;
     bool unanswered; /* it was given up: nothing more is asked for until its reply is late or a later one shows that it
                       * is lost */
@@ -68,7 +71,8 @@ void pkt_rx_clear(struct pkt_rx *rx, struct hm2_serial *port);
 enum pkt_rx_health { PKT_RX_GOOD, PKT_RX_LOST, PKT_RX_OVERRUN };
 /* A reply. Unless it is good the receiver must be cleared: sizes and words do not belong together for certain. */
 enum pkt_rx_health pkt_rx_take(struct pkt_rx *rx, struct hm2_serial *port);
-void pkt_rx_late(struct pkt_rx *rx, struct hm2_serial *port, uint64_t request);
+/* False when something was taken that nobody counts on. */
+bool pkt_rx_late(struct pkt_rx *rx, struct hm2_serial *port, uint64_t request);
 /* Words that the card's buffer may hold now, at most. */
 unsigned pkt_rx_most_words(const struct pkt_rx *rx, int64_t now_ns);
 void pkt_rx_ask(struct pkt_rx *rx, const struct hm2_serial *port, bool ready);

@@ -175,6 +175,12 @@ static void show_counts(struct hm2_serial *const port)
 /* ---- the ports of a module ------------------------------------------------------------------------------------------
  */
 
+struct ports {
+    bool tallied;
+    struct hm2_plan_tally tally; /* as of the last good reply */
+    struct hm2_serial *port[];
+};
+
 static void locate(struct hm2_serial *const port, const struct hm2_md *const tx, const struct hm2_md *const rx,
                    const unsigned unit, const unsigned unit_stride)
 {
@@ -191,11 +197,11 @@ int serial_setup(struct hm2_module *const module, struct hm2_setup *const setup,
     if (!rx || rx->instances < module->instances)
         return hm2_diag_add(setup->diag, HM2_ERR_MISMATCH, "%s: the firmware has %u %s transmitters and %u receivers",
                             setup->prefix, module->md->instances, kind->title, rx ? rx->instances : 0);
-    struct hm2_serial **const ports = hm2_setup_alloc(setup, module->instances * sizeof(struct hm2_serial *));
+    struct ports *const ports = hm2_setup_alloc(setup, sizeof *ports + module->instances * sizeof(struct hm2_serial *));
     if (!ports)
         return HM2_ERR_NOMEM;
     for (unsigned unit = 0; unit < module->instances; unit++) {
-        struct hm2_serial *const port = ports[unit] = hm2_setup_alloc(setup, kind->size);
+        struct hm2_serial *const port = ports->port[unit] = hm2_setup_alloc(setup, kind->size);
         if (!port)
             return HM2_ERR_NOMEM;
         port->ops = kind->ops;
@@ -224,14 +230,65 @@ const char *serial_output_name(const struct hm2_pd *const pd)
 
 struct hm2_serial *serial_port(const struct hm2_module *const module, const unsigned unit)
 {
-    struct hm2_serial *const *const ports = module->context;
-    return ports && unit < module->instances ? ports[unit] : NULL;
+    const struct ports *const ports = module->context;
+    return ports && unit < module->instances ? ports->port[unit] : NULL;
 }
 
 static struct hm2_serial *open_port(const struct hm2_module *const module, const unsigned unit)
 {
     struct hm2_serial *const port = serial_port(module, unit);
     return port && port->open ? port : NULL;
+}
+
+/* The card may have another count now. */
+void serial_start(struct hm2_module *const module, const struct hm2_cycle *const cycle)
+{
+    struct ports *const ports = module->context;
+    (void)cycle;
+    if (ports)
+        ports->tallied = false;
+}
+
+static unsigned beyond(const unsigned came, const unsigned sent)
+{
+    return came > sent ? came - sent : 0;
+}
+
+/* The request before was answered. When the card has sent no other reply, no other request has come. */
+static struct serial_passage look_back(struct ports *const ports, const struct hm2_plan *const plan)
+{
+    const struct hm2_plan_tally now = hm2_plan_tally(plan), before = ports->tally;
+    const uint16_t requests = (uint16_t)(now.requests - before.requests),
+                   writes = (uint16_t)(now.writes - before.writes);
+    const uint16_t came = (uint16_t)(now.came - before.came), answered = (uint16_t)(now.answered - before.answered);
+    const bool tallied = ports->tallied;
+    ports->tally = now;
+    ports->tallied = true;
+    return (struct serial_passage){.twice = tallied ? beyond(answered, requests) : 0,
+                                   .writes_twice = tallied ? beyond(beyond(came, answered), writes) : 0,
+                                   .unheard = tallied && answered <= 1u};
+}
+
+/* Whoever sees a stray request knows that one more came, also when another was lost. */
+static void see_passage(struct hm2_serial *const port, const struct serial_passage passage)
+{
+    port->passage = passage;
+    port->passage.stray = port->stray;
+    if (port->stray && passage.twice == 0)
+        port->passage.twice = 1;
+    port->stray = false;
+}
+
+/* What a write handed to the card may have come to it twice: that of a turn before the last reply, that of a plain
+ * cycle behind it. */
+static void count_twice(struct hm2_serial *const port, const bool turned)
+{
+    const bool in_this_turn = turned && !port->held;
+    if (port->passage.twice > 0)
+        port->counts.tx_uncertain += port->turned_bytes;
+    if (port->passage.writes_twice > 0 && !in_this_turn)
+        port->counts.tx_uncertain += port->sent_bytes;
+    port->turned_bytes = in_this_turn ? port->sent_bytes : 0;
 }
 
 /* The reply to the turn behind one that had none: are the bytes of that one in the card? This one had no bytes. */
@@ -243,7 +300,7 @@ HM2_RARE static void take_held(struct hm2_serial *const port, const struct hm2_c
     port->resend = cycle->turned && !cycle->before_kept;
     port->ops->take(port);
     if (port->resend)
-        port->sent_bytes = bytes;
+        port->turned_bytes = port->sent_bytes = bytes; /* that turn may still come */
     else if (cycle->turned)
         port->counts.tx_bytes += bytes;
     else
@@ -261,13 +318,20 @@ static void take(struct hm2_serial *const port)
 
 void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
+    struct serial_passage passage;
+    bool looked = false;
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct hm2_serial *const port = open_port(module, unit);
         if (!port || !port->awaiting)
             continue;
+        if (!looked)
+            passage = look_back(module->context, port->plan);
+        looked = true;
         port->awaiting = false;
         port->sent_ns = cycle->now_ns;
         port->now_ns = cycle->received_ns;
+        see_passage(port, passage);
+        count_twice(port, cycle->turned);
         if (port->held)
             take_held(port, cycle);
         else
@@ -283,7 +347,7 @@ void serial_late(struct hm2_module *const module, const uint64_t request, const 
         if (!port)
             continue;
         port->now_ns = now_ns;
-        port->ops->late(port, request);
+        port->stray = !port->ops->late(port, request) || port->stray;
         show_counts(port);
     }
 }

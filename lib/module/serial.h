@@ -76,6 +76,16 @@ struct queue_place queue_place(struct queue *queue, unsigned words, unsigned n);
 /* ---- a port ---------------------------------------------------------------------------------------------------------
  */
 
+/* What a reply tells of the datagrams between it and the good one before: that one's request, and all that were sent
+ * after it. */
+struct serial_passage {
+    /* So many more have come than were sent: some came twice, or somebody else talks to the card. */
+    unsigned twice;        /* requests, and turns */
+    unsigned writes_twice; /* plain ones */
+    bool stray; /* a request was carried out that nobody counts on: what FIFOs show now may not be what was expected */
+    bool unheard; /* requests without a reply have not come */
+};
+
 enum { SERIAL_DATA, SERIAL_COUNT, SERIAL_RATE, SERIAL_MODE, SERIAL_REGISTERS };
 
 #define SERIAL_COUNTS (sizeof(struct hm2_serial_counts) / sizeof(uint32_t))
@@ -86,11 +96,14 @@ struct hm2_serial {
     double clock_hz;
     uint16_t tx_reg[SERIAL_REGISTERS], rx_reg[SERIAL_REGISTERS];
     bool open;
-    bool awaiting;           /* a write and a request with our words are on their way */
-    bool resend;             /* the last write was lost: the same again */
-    bool held;               /* a turn had no reply: whether sent_bytes arrived is told by the next one */
-    unsigned sent_bytes;     /* in the last write, until it is known to have arrived */
-    int64_t sent_ns, now_ns; /* take: of the request, and of its reply; late and ask: now */
+    bool awaiting;                 /* a write and a request with our words are on their way */
+    bool resend;                   /* the last write was lost: the same again */
+    bool held;                     /* a turn had no reply: whether sent_bytes arrived is told by the next one */
+    unsigned sent_bytes;           /* in the last write, until it is known to have arrived */
+    unsigned turned_bytes;         /* in the turn that was answered last */
+    bool stray;                    /* since the last good reply */
+    struct serial_passage passage; /* take: up to this reply */
+    int64_t sent_ns, now_ns;       /* take: of the request, and of its reply; late and ask: now */
     struct hm2_serial_settings settings;
     struct ring tx, rx;
     struct frame_ring tx_frames, rx_frames; /* when the settings say frames */
@@ -103,8 +116,9 @@ struct hm2_serial {
 struct serial_ops {
     int (*open)(struct hm2_serial *port, struct hm2_diag *diag);
     int (*set)(struct hm2_serial *port, const struct hm2_serial_settings *settings, struct hm2_diag *diag);
-    void (*take)(struct hm2_serial *port);                   /* a fresh reply; what was sent is counted already */
-    void (*late)(struct hm2_serial *port, uint64_t request); /* one that was given up */
+    void (*take)(struct hm2_serial *port); /* a fresh reply; what was sent is counted already */
+    /* One that was given up, or a second one. False when it took something that nobody counts on. */
+    bool (*late)(struct hm2_serial *port, uint64_t request);
     /* No fresh reply since the last write. With hold its bytes, if it may, stay as they are until the next reply tells
      * whether they arrived: true. */
     bool (*miss)(struct hm2_serial *port, bool hold);
@@ -142,6 +156,7 @@ struct hm2_serial *serial_port(const struct hm2_module *module, unsigned unit);
 /* All that wait, and what else is in the rings. */
 void serial_drop_frames(struct hm2_serial *port);
 
+void serial_start(struct hm2_module *module, const struct hm2_cycle *cycle);
 void serial_unpack(struct hm2_module *module, const struct hm2_cycle *cycle);
 void serial_pack(struct hm2_module *module, const struct hm2_cycle *cycle);
 void serial_write_lost(struct hm2_module *module);

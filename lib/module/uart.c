@@ -24,6 +24,10 @@
 #define RX_MASK     (1u << 2)
 #define RX_ERRORS   3u
 #define RX_LOST     (1u << 5)
+#define POPPED_MOST (POP_BYTES - 1u + POPS * POP_BYTES)
+#define NS_PER_S    1e9
+#define BYTE_BITS   10.0   /* start and stop bit included */
+#define FASTEST     1.0625 /* a peer's clock that is off by more is not understood */
 
 /* What a request takes out of the receiver. */
 struct asked {
@@ -32,7 +36,7 @@ struct asked {
     bool fours;
 };
 
-#define UNANSWERED 4u
+#define UNANSWERED 16u
 
 struct uart {
     struct hm2_serial port; /* first: a port is found through it */
@@ -42,6 +46,10 @@ struct uart {
     bool again;
     unsigned known, free_words;
     struct asked asked;                  /* in the last request */
+    bool popped;                         /* the one that was answered last has asked for something */
+    unsigned left, taken;                /* bytes: that it left in the card; that came since */
+    unsigned gone;                       /* with requests since that will not be answered, at most */
+    int64_t left_ns;                     /* not sooner */
     struct asked unanswered[UNANSWERED]; /* in those that were given up, oldest first; their replies may be late */
     unsigned unanswered_count;
 };
@@ -105,7 +113,8 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
     hm2_section_set(&u->rx_mode, 0, s->mask ? RX_MASK : 0);
     hm2_section_touch(&u->tx_clear);
     hm2_section_touch(&u->rx_clear);
-    u->known = u->free_words = u->unanswered_count = 0;
+    u->known = u->free_words = u->unanswered_count = u->left = u->taken = u->gone = 0;
+    u->popped = false;
     u->asked = (struct asked){0};
     return 0;
 }
@@ -117,6 +126,7 @@ static void take(struct uart *const u, const struct hm2_window *const window, co
 {
     uint8_t bytes[4];
     hm2_put_le32(bytes, hm2_window_get(window, 0));
+    u->taken += len;
     u->port.counts.rx_bytes += (uint32_t)ring_put(&u->port.rx, bytes, len);
 }
 
@@ -137,9 +147,44 @@ static void take_bytes(struct uart *const u, const struct asked asked)
 static void drop_unanswered(struct uart *const u, const unsigned n)
 {
     for (unsigned i = 0; i < n; i++)
-        u->port.counts.rx_uncertain += u->unanswered[i].popped + (u->unanswered[i].fours ? POPS * POP_BYTES : 0);
+        u->gone += u->unanswered[i].popped + (u->unanswered[i].fours ? POPS * POP_BYTES : 0);
     u->unanswered_count -= n;
     memmove(u->unanswered, u->unanswered + n, u->unanswered_count * sizeof u->unanswered[0]);
+}
+
+/* What the card had since the last good reply, at most, less what is accounted for. */
+static unsigned missing_most(const struct uart *const u)
+{
+    const double ns = (double)(u->port.now_ns - u->left_ns);
+    const double came = ns > 0.0 ? ns / NS_PER_S * FASTEST * u->port.settings.baud / BYTE_BITS : 0.0;
+    const double most = u->left + came + 1.0 - u->taken - count_at(u, POPS);
+    return most <= 0.0 ? 0 : most < UINT16_MAX ? (unsigned)most : UINT16_MAX;
+}
+
+/* Bytes that went to requests without a reply, as far as these came, or to some that came twice. doubted: of this
+ * reply, which nobody could expect to be there. */
+HM2_RARE static void count_missing(struct uart *const u, const unsigned doubted)
+{
+    const struct serial_passage *const passage = &u->port.passage;
+    const unsigned bound = missing_most(u), gone = passage->unheard ? 0 : u->gone;
+    const unsigned twice = u->popped || passage->stray ? passage->twice * POPPED_MOST : 0;
+    const unsigned most = gone + twice + doubted;
+    u->port.counts.rx_uncertain += most < bound ? most : bound;
+}
+
+static void take_asked(struct uart *const u)
+{
+    const unsigned doubted = u->port.passage.stray ? u->asked.popped : 0;
+    drop_unanswered(u, u->unanswered_count); /* a later reply is here already */
+    u->asked.popped -= doubted;
+    take_bytes(u, u->asked);
+    if (u->gone > 0 || u->port.passage.twice > 0)
+        count_missing(u, doubted);
+    u->popped = u->asked.fours;
+    u->asked = (struct asked){0};
+    u->known = u->left = count_at(u, POPS);
+    u->left_ns = u->port.sent_ns;
+    u->gone = u->taken = 0;
 }
 
 static void take_received(struct hm2_serial *const port)
@@ -147,11 +192,8 @@ static void take_received(struct hm2_serial *const port)
     struct uart *const u = (struct uart *)port;
     const uint32_t words = hm2_window_get(&u->tx_count, 0) & COUNT_MASK;
     u->free_words = words < FIFO_WORDS ? FIFO_WORDS - words : 0;
-    drop_unanswered(u, u->unanswered_count); /* a later reply is here already */
-    take_bytes(u, u->asked);
-    u->asked = (struct asked){0};
+    take_asked(u);
     const uint32_t state = hm2_window_get(&u->rx_state, 0);
-    u->known = count_at(u, POPS);
     u->again = u->again && !hm2_section_confirmed(&u->rx_again);
     if (state & RX_ERRORS) {
         u->port.counts.rx_errors++;
@@ -164,7 +206,7 @@ static void take_received(struct hm2_serial *const port)
     }
 }
 
-static void take_late(struct hm2_serial *const port, const uint64_t request)
+static bool take_late(struct hm2_serial *const port, const uint64_t request)
 {
     struct uart *const u = (struct uart *)port;
     unsigned i = 0;
@@ -172,16 +214,17 @@ static void take_late(struct hm2_serial *const port, const uint64_t request)
         drop_unanswered(u, u->unanswered_count);
         take_bytes(u, u->asked);
         u->asked = (struct asked){0};
-        return;
+        return true;
     }
     while (i < u->unanswered_count && u->unanswered[i].request != request)
         i++;
     if (i == u->unanswered_count)
-        return;
+        return false;
     drop_unanswered(u, i);
     take_bytes(u, u->unanswered[0]);
     u->unanswered[0] = (struct asked){0};
     drop_unanswered(u, 1);
+    return true;
 }
 
 /* ---- write ----------------------------------------------------------------------------------------------------------
@@ -190,7 +233,7 @@ static void take_late(struct hm2_serial *const port, const uint64_t request)
 static bool miss(struct hm2_serial *const port, const bool hold)
 {
     struct uart *const u = (struct uart *)port;
-    if (u->asked.fours) {
+    if (u->asked.request != 0) {
         if (u->unanswered_count == UNANSWERED)
             drop_unanswered(u, 1);
         u->unanswered[u->unanswered_count++] = u->asked;
@@ -269,6 +312,7 @@ const struct hm2_module_type hm2_uart_type = {
     .variant_count = sizeof variants / sizeof variants[0],
     .config_count = HM2_CFG_UARTS,
     .setup = setup,
+    .start = serial_start,
     .unpack = serial_unpack,
     .pack = serial_pack,
     .write_lost = serial_write_lost,

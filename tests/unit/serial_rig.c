@@ -3,6 +3,31 @@
 
 #include "unit.h"
 
+#include "replay.h"
+
+#define MODULES_AT   1u /* word of the ROM: where the module descriptors begin, in bytes */
+#define MODULE_WORDS 3u
+
+struct sim_bench *serial_rig_pipelined(const char *const firmware)
+{
+    static const uint32_t dpll[MODULE_WORDS] = {1u << 24 | 1u << 16 | HM2_GTAG_DPLL, 7u << 16 | 0x7000u, 0};
+    static struct hm2_image image;
+    assert_true(replay_firmware(firmware, &image));
+    uint32_t at = image.rom[MODULES_AT] / 4u;
+    while (image.rom[at] & 0xFFu)
+        at += MODULE_WORDS;
+    memcpy(image.rom + at, dpll, sizeof dpll);
+    image.rom[at + MODULE_WORDS] = 0;
+    return sim_bench_of(&(struct sim_card_options){.profile = "7i80hd-16", .seed = 1, .image = &image}, "pipelined=4");
+}
+
+void serial_rig_start_turns(struct sim_bench *const bench)
+{
+    for (unsigned i = 0; i < SERIAL_RIG_TO_TURNS && sim_bench_get(bench, "pipeline.active") == 0; i++)
+        sim_bench_cycle(bench);
+    assert_true(sim_bench_get(bench, "pipeline.active") == 1);
+}
+
 struct hm2_serial *serial_rig_open(struct sim_bench *bench, const enum hm2_serial_kind kind,
                                    const struct hm2_serial_settings *settings)
 {

@@ -1,38 +1,11 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /* Queues in pipelined cycles, in virtual time: UART, PktUART and buffered SPI, with turns and replies that are lost
- * (docs/pipelined-cycle.md). The recorded firmware with these has no DPLL: it gets the 7I96S's. */
+ * (docs/pipelined-cycle.md). */
 #include "unit.h"
 
 #include <hm2/bspi.h>
-#include <hm2/serial.h>
 
-#include "replay.h"
-#include "sim_bench.h"
-
-#define MODULES_AT   1u /* word of the ROM: where the module descriptors begin, in bytes */
-#define MODULE_WORDS 3u
-#define TO_TURNS     600u
-#define PIPELINED    "pipelined=4"
-
-static struct sim_bench *new_bench(const char *const firmware)
-{
-    static const uint32_t dpll[MODULE_WORDS] = {1u << 24 | 1u << 16 | HM2_GTAG_DPLL, 7u << 16 | 0x7000u, 0};
-    static struct hm2_image image;
-    assert_true(replay_firmware(firmware, &image));
-    uint32_t at = image.rom[MODULES_AT] / 4u;
-    while (image.rom[at] & 0xFFu)
-        at += MODULE_WORDS;
-    memcpy(image.rom + at, dpll, sizeof dpll);
-    image.rom[at + MODULE_WORDS] = 0;
-    return sim_bench_of(&(struct sim_card_options){.profile = "7i80hd-16", .seed = 1, .image = &image}, PIPELINED);
-}
-
-static void start_turns(struct sim_bench *const bench)
-{
-    for (unsigned i = 0; i < TO_TURNS && sim_bench_get(bench, "pipeline.active") == 0; i++)
-        sim_bench_cycle(bench);
-    assert_true(sim_bench_get(bench, "pipeline.active") == 1);
-}
+#include "serial_rig.h"
 
 /* ---- serial ports ------------------------------------------------------------------------------------------------
  */
@@ -90,7 +63,7 @@ static void open_line(struct line *const l)
 {
     const struct hm2_serial_settings settings = {
         .baud = l->row->baud, .drive = l->row->drive, .tx_gap_bits = 24, .rx_gap_bits = 14};
-    l->bench = new_bench(l->row->firmware);
+    l->bench = serial_rig_pipelined(l->row->firmware);
     l->port = hm2_serial_port(l->bench->board, l->row->kind, 0);
     assert_non_null(l->port);
     hm2_board_change_begin(l->bench->board);
@@ -98,7 +71,7 @@ static void open_line(struct line *const l)
     assert_int_equal(hm2_board_change_end(l->bench->board, &l->bench->diag), 0);
     assert_int_equal(hm2_serial_set(l->port, &settings, &l->bench->diag), 0);
     assert_int_equal(sim_card_serial(l->bench->card, l->row->gtag, 0, hear, l), 0);
-    start_turns(l->bench);
+    serial_rig_start_turns(l->bench);
     sim_net_on_taken(l->bench->net, spoil, l);
 }
 
@@ -250,11 +223,11 @@ static void open_wire(struct sim_bench *const bench, struct wire *const wire, ui
 static void echoes_are_those_of_the_turn_that_sent_the_frames(void **state)
 {
     (void)state;
-    struct sim_bench *const bench = new_bench("2X7I65_72");
+    struct sim_bench *const bench = serial_rig_pipelined("2X7I65_72");
     struct wire wire;
     uint32_t *out[2], *in[2], shown = 0;
     open_wire(bench, &wire, out, in);
-    start_turns(bench);
+    serial_rig_start_turns(bench);
     hm2_board_read(bench->board, BENCH_PERIOD_NS);
     for (uint32_t n = 1; n < 500; n++) {
         const bool lost = n % 100 == 50;
@@ -282,7 +255,7 @@ static void a_timer_that_is_shorter_than_the_frames_keeps_cycles_plain(void **st
 {
     static const struct hm2_bspi_channel slow = {.chip_select = 3, .bits = 32, .mhz = 1.0};
     (void)state;
-    struct sim_bench *const bench = new_bench("2X7I65_72");
+    struct sim_bench *const bench = serial_rig_pipelined("2X7I65_72");
     struct hm2_bspi *const port = hm2_bspi_port(bench->board, 0);
     uint32_t *out, *in;
     assert_int_equal(hm2_bspi_set_channel(port, 3, &slow, &bench->diag), 0);
@@ -290,7 +263,7 @@ static void a_timer_that_is_shorter_than_the_frames_keeps_cycles_plain(void **st
     for (unsigned i = 0; i < 8; i++)
         assert_int_equal(hm2_bspi_add_frame(port, 3, &out, &in, &bench->diag), 0);
     assert_int_equal(hm2_board_change_end(bench->board, &bench->diag), 0);
-    for (unsigned i = 0; i < TO_TURNS; i++)
+    for (unsigned i = 0; i < SERIAL_RIG_TO_TURNS; i++)
         sim_bench_cycle(bench);
     assert_true(sim_bench_get(bench, "pipeline.active") == 0);
     sim_bench_set(bench, "dpll.04.timer-us", 310);

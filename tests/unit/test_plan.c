@@ -390,6 +390,49 @@ static void a_duplicate_is_stale_and_does_not_reach_the_windows(void **state)
     assert_int_equal(hm2_window_get(&window, 0), 11);
 }
 
+/* The count of packets is the last word of the reply: a card that carries a request out twice tells two of them. */
+static void a_second_answer_to_the_last_request_is_told_from_a_copy_of_the_first(void **state)
+{
+    struct fixture *const fixture = *state;
+    size_t unused;
+    freeze(fixture);
+    const size_t len = request(fixture);
+    assert_int_equal(deliver(fixture, len), HM2_REPLY_FRESH);
+    assert_int_equal(deliver(fixture, len), HM2_REPLY_STALE);
+    assert_int_equal(hm2_plan_late_request(fixture->plan), 0);
+    fixture->kept[len - 2]++;
+    assert_int_equal(deliver(fixture, len), HM2_REPLY_STALE);
+    assert_int_equal(hm2_plan_late_request(fixture->plan), 1);
+    (void)hm2_plan_request(fixture->plan, &unused);
+    assert_int_equal(deliver(fixture, len), HM2_REPLY_STALE);
+    assert_int_equal(hm2_plan_late_request(fixture->plan), 1);
+    read_cycle(fixture);
+    assert_int_equal(deliver(fixture, len), HM2_REPLY_STALE); /* of an older one nobody knows */
+}
+
+/* The last word of the reply, and of a plan with queues one in front of the numbers. */
+static void datagrams_before_the_last_request_are_counted_on_both_sides(void **state)
+{
+    struct fixture *const fixture = *state;
+    struct hm2_window window;
+    assert_int_equal(hm2_plan_add_queue_read(fixture->plan, &window, 0x1000, 1, NULL), 0);
+    freeze(fixture);
+    (void)write_cycle(fixture, true);
+    read_cycle(fixture);
+    (void)write_cycle(fixture, false);
+    assert_int_equal(hm2_plan_tally(fixture->plan).requests, 0);
+    assert_int_equal(hm2_plan_tally(fixture->plan).writes, 1);
+    const size_t len = request(fixture);
+    fixture->kept[len - 16] = 7;
+    fixture->kept[len - 15] = 1;
+    assert_int_equal(deliver(fixture, len), HM2_REPLY_FRESH);
+    const struct hm2_plan_tally tally = hm2_plan_tally(fixture->plan);
+    assert_int_equal(tally.requests, 1);
+    assert_int_equal(tally.writes, 2);
+    assert_int_equal(tally.came, hm2_plan_facts(fixture->plan).card_rx_udp);
+    assert_int_equal(tally.answered, 0x107);
+}
+
 static void a_reply_to_a_request_given_up_is_late_once(void **state)
 {
     struct fixture *const fixture = *state;
@@ -854,6 +897,8 @@ int main(void)
         CASE(two_writes_of_one_register_are_refused_unless_ranks_order_them),
         CASE(a_full_plan_says_what_it_holds),
         CASE(a_duplicate_is_stale_and_does_not_reach_the_windows),
+        CASE(a_second_answer_to_the_last_request_is_told_from_a_copy_of_the_first),
+        CASE(datagrams_before_the_last_request_are_counted_on_both_sides),
         CASE(a_reply_to_a_request_given_up_is_late_once),
         CASE(what_was_never_asked_for_is_malformed),
         CASE(a_long_silence_makes_late_replies_and_no_fresh_ones),

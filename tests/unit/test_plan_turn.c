@@ -142,6 +142,22 @@ static void a_reply_tells_whether_the_write_before_it_was_the_last_one(void **st
     assert_true(hm2_plan_facts(f->plan).before_kept);
 }
 
+static void a_turn_counts_as_a_request(void **state)
+{
+    struct fixture *const f = *state;
+    size_t len;
+    freeze(f);
+    turn(f);
+    assert_int_equal(hm2_plan_tally(f->plan).requests, 0);
+    assert_int_equal(hm2_plan_tally(f->plan).writes, 0);
+    turn(f);
+    assert_int_equal(hm2_plan_tally(f->plan).requests, 1);
+    (void)hm2_plan_write(f->plan, &len);
+    (void)hm2_plan_request(f->plan, &len);
+    assert_int_equal(hm2_plan_tally(f->plan).requests, 2);
+    assert_int_equal(hm2_plan_tally(f->plan).writes, 1);
+}
+
 static void sections_of_a_lost_turn_are_sent_again(void **state)
 {
     struct fixture *const f = *state;
@@ -230,6 +246,7 @@ int main(void)
         TEST(its_reply_confirms_the_write_and_reaches_the_windows),
         TEST(what_is_not_the_reply_is_told_apart),
         TEST(a_reply_tells_whether_the_write_before_it_was_the_last_one),
+        TEST(a_turn_counts_as_a_request),
         TEST(sections_of_a_lost_turn_are_sent_again),
         TEST(an_older_turn_that_arrives_between_two_newer_ones_is_noticed),
         TEST(plain_requests_and_turns_follow_each_other),

@@ -110,8 +110,9 @@ struct hm2_module_type {
     /* After the reply was judged fresh but before unpack, a write had been lost: modules with self-clearing bits
      * learn here that what they sent did not arrive. Most need nothing (sections are resent). May be NULL. */
     void (*write_lost)(struct hm2_module *module);
-    /* A reply to the request of this number (hm2_plan_requests()) has come after it was given up, now; while this runs,
-     * the windows show it. For FIFOs, whose words come only once: anything else in it is out of date. May be NULL. */
+    /* A reply to the request of this number (hm2_plan_requests()) has come after it was given up, or a second one that
+     * tells that the card carried it out twice, now; while this runs, the windows show it. For FIFOs, whose words come
+     * only once: anything else in it is out of date. May be NULL. */
     void (*late)(struct hm2_module *module, uint64_t request, int64_t now_ns);
     /* For pipelined cycles: how long after a write what it has started can be read, and whether the last reply to a
      * turn came too early for it all the same. Both NULL = a write starts nothing that takes time. Realtime safe. */

@@ -54,8 +54,9 @@ struct hm2_serial_counts {
     uint32_t rx_bytes, tx_bytes;
     uint32_t rx_errors;    /* false starts, missing stop bits, wrong parity */
     uint32_t rx_overruns;  /* the card's buffers ran over, or no longer made sense, and were cleared */
-    uint32_t rx_uncertain; /* bytes that may have been lost with a reply, at most (late replies are used) */
-    uint32_t tx_uncertain; /* bytes of which nobody knows whether they were sent, for the same reason */
+    uint32_t rx_uncertain; /* bytes that may have been lost with a reply, or to a request that the network delivered
+                              twice, at most (late replies are used; a request that never came took none) */
+    uint32_t tx_uncertain; /* bytes of which nobody knows whether they were sent, or sent once, for the same reasons */
 };
 
 /* Port `unit` of a card that is set up, or NULL when it has none or the configuration does not use it. */
