@@ -55,7 +55,7 @@ RTAPI_MP_ARRAY_STRING(board_ip, MAX_CARDS, "IPv4 address of each card, optionall
 static char *config[MAX_CARDS];
 RTAPI_MP_ARRAY_STRING(config, MAX_CARDS, "configuration of each card, see hm2_lbp16(9)");
 static int debug = 0;
-RTAPI_MP_INT(debug, "1 = print the pin listing and packet sizes at load");
+RTAPI_MP_INT(debug, "1 = print the pin listing and packet sizes at load; 2 = and warnings of the cycle");
 static int busy_poll = 0;
 RTAPI_MP_INT(busy_poll, "SO_BUSY_POLL of the sockets in microseconds, up to 1000000; 0 = off");
 static char *receive = 0;
@@ -488,9 +488,18 @@ static void isolate(const unsigned count, const enum isolation_mode mode)
     messenger_print_diag("hm2_lbp16", "network", &diag);
 }
 
+/* The message level of LinuxCNC 2.9's realtime components is not the one that its halcmd sets. */
+static void let_warnings_through(void)
+{
+    if (rtapi_get_msg_level() < RTAPI_MSG_WARN)
+        (void)rtapi_set_msg_level(RTAPI_MSG_WARN);
+}
+
 static int load_cards(void)
 {
     enum isolation_mode mode;
+    if (debug > 1)
+        let_warnings_through();
     tell_what_has_no_effect();
     if (!board_ip[0] || !board_ip[0][0]) {
         rtapi_print_msg(RTAPI_MSG_ERR,

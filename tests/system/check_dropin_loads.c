@@ -299,6 +299,7 @@ static const struct {
     const char *parameter, *sentence; /* NULL: nothing is said about it */
 } parameters[] = {
     {"debug=1", "payload of a cycle: request "},
+    {"debug=2", "payload of a cycle: request "},
     {"debug_idrom=1", "payload of a cycle: request "},
     {"debug_module_descriptors=1", "payload of a cycle: request "},
     {"debug_pin_descriptors=1", "IO Pin 017 (TB1-2,3): StepGen #0, pin Step"},

@@ -387,8 +387,7 @@ START_TEST(a_card_that_says_nothing_for_half_a_second_is_loaded_all_the_same)
     simulator_start(&sim, (const char *const[]){"--faults", "loss=1", NULL});
     talk_start(&hal, NULL);
     load_line(line, 1, "");
-    process_say(&hal.host, line);
-    process_say(&hal.host, "\n");
+    talk_say(&hal, line);
     usleep(500000);
     simulator_do(&sim, "faults none");
     talk_do(&hal, "getp hm2_7i96s.0.packet-error-total");

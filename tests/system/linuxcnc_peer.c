@@ -5,9 +5,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define CANNOT_RUN 77
+#define MAX_ARGS   32
+#define START_MS   60000
 
 bool linuxcnc_loads_ours(void)
 {
@@ -46,4 +49,26 @@ bool linuxcnc_run_to(struct process *const run, const char *const *const argv, c
         ck_abort_msg("%s, status %d", what, run->status);
     }
     return true;
+}
+
+bool linuxcnc_talk(struct talk *const talk, const char *const out, const char *const card, const char *const *options)
+{
+    const char *argv[MAX_ARGS] = {TEST_SOURCE "/tests/system/linuxcnc-peer", TEST_BUILD, out, card, "-"};
+    unsigned n = 5;
+    if (!linuxcnc_loads_ours())
+        return false;
+    (void)mkdir(out, 0755);
+    linuxcnc_tell("PEER_MODULES", TEST_BUILD "/linuxcnc");
+    for (; *options; options++) {
+        ck_assert_uint_lt(n + 1, MAX_ARGS);
+        argv[n++] = *options;
+    }
+    talk_start_host(talk, argv);
+    talk_say(talk, "print");
+    if (process_wait_line(&talk->host, "<stdin>:1: ", START_MS, NULL))
+        return true;
+    (void)process_wait_end(&talk->host, START_MS);
+    if (!linuxcnc_skipped(&talk->host))
+        ck_abort_msg("LinuxCNC does not listen: %.4000s", talk->host.text);
+    return false;
 }

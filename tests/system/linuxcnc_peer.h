@@ -4,7 +4,7 @@
 #ifndef TEST_LINUXCNC_PEER_H
 #define TEST_LINUXCNC_PEER_H
 
-#include "process.h"
+#include "talk.h"
 
 /* False, and the reason printed as a skip, where LinuxCNC cannot load what this build made. */
 bool linuxcnc_loads_ours(void);
@@ -19,5 +19,9 @@ bool linuxcnc_skipped(struct process *run);
  * NULL) points at. False when it was skipped; anything else fails the test, which says `what` then. */
 bool linuxcnc_run_to(struct process *run, const char *const *argv, int limit_ms, const char *start, const char *what,
                      const char **line);
+
+/* HAL commands for LinuxCNC, with a simulated card of this type at 192.168.1.121 (hm2sim's options, NULL-terminated).
+ * What they write to PEER_OUT is in the folder `out` at the end. False when it was skipped. */
+bool linuxcnc_talk(struct talk *talk, const char *out, const char *card, const char *const *options);
 
 #endif

@@ -26,7 +26,7 @@
 #define TEST_SANITIZED 0
 #endif
 
-#define PROCESS_OUTPUT_BYTES (256u * 1024u)
+#define PROCESS_OUTPUT_BYTES (1024u * 1024u)
 
 struct process {
     pid_t pid;

@@ -13,7 +13,14 @@
 #define WAIT_STEPS  2000u
 #define STEP_US     10000
 #define MAX_ARGS    24
+#define MARK_BYTES  48
 #define SHOWN_BYTES 2000u /* of what was said, in a failure; Check takes no more than some kilobytes */
+
+void talk_start_host(struct talk *const talk, const char *const *const argv)
+{
+    talk->lines = 0;
+    process_start_listening(&talk->host, argv);
+}
 
 void talk_start(struct talk *const talk, const char *const *options)
 {
@@ -22,32 +29,40 @@ void talk_start(struct talk *const talk, const char *const *options)
     for (; options && *options; options++)
         argv[n++] = *options;
     argv[n] = NULL;
-    talk->asked = 0;
-    process_start_listening(&talk->host, argv);
+    talk_start_host(talk, argv);
 }
 
 void talk_end(struct talk *const talk)
 {
     process_hush(&talk->host);
     if (!process_wait_end(&talk->host, END_MS))
-        ck_abort_msg("hm2host does not end: %s", talk->host.text);
+        ck_abort_msg("it does not end: %s", talk->host.text);
     if (talk->host.status != 0)
-        ck_abort_msg("hm2host ended with %d: %.4000s", talk->host.status, talk->host.text);
+        ck_abort_msg("it ended with %d: %.4000s", talk->host.status, talk->host.text);
     (void)process_stop(&talk->host, 0, 0);
 }
 
+void talk_say(struct talk *const talk, const char *const command)
+{
+    talk->lines++;
+    for (const char *at = command; *at; at++)
+        talk->lines += *at == '\n';
+    process_say(&talk->host, command);
+    process_say(&talk->host, "\n");
+}
+
+/* `print` tells the number of its line, in hm2host as in LinuxCNC's halcmd: this marks the end of an answer. */
 const char *talk_try(struct talk *const talk, const char *const command)
 {
     static char answer[PROCESS_OUTPUT_BYTES];
-    char text[8192], mark[32];
+    char mark[MARK_BYTES];
     const size_t before = talk->host.len;
-    snprintf(mark, sizeof mark, "=%u=\n", ++talk->asked);
-    const int len = snprintf(text, sizeof text, "%s\necho %s", command, mark);
-    ck_assert_uint_lt((size_t)len, sizeof text);
-    process_say(&talk->host, text);
+    talk_say(talk, command);
+    talk_say(talk, "print =");
+    snprintf(mark, sizeof mark, "<stdin>:%u: HALCMD MSG: =", talk->lines);
     const char *line;
     if (!process_wait_line(&talk->host, mark, ANSWER_MS, &line))
-        ck_abort_msg("hm2host does not answer \"%s\": %s", command, talk->host.text + before);
+        ck_abort_msg("no answer to \"%s\": %s", command, talk->host.text + before);
     const size_t answer_len = (size_t)(line - talk->host.text) - before;
     memcpy(answer, talk->host.text + before, answer_len);
     answer[answer_len] = '\0';

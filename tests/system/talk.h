@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A conversation with hm2host: commands go to its standard input, what they print comes back. An error in a command
- * ends nothing there. Failures end the test through Check.
+ * A conversation with hm2host, or with LinuxCNC (linuxcnc_peer.h): commands go to its standard input, what they print
+ * comes back. An error in a command ends nothing there. Failures end the test through Check.
  */
 #ifndef TEST_TALK_H
 #define TEST_TALK_H
@@ -10,14 +10,18 @@
 
 struct talk {
     struct process host;
-    unsigned asked;
+    unsigned lines; /* said so far */
 };
 
 /* Start hm2host with these options besides its own (NULL-terminated, may be NULL). */
 void talk_start(struct talk *talk, const char *const *options);
-/* End of input: hm2host unloads everything. Its exit status must be 0. */
+/* Start another program that takes the same commands. */
+void talk_start_host(struct talk *talk, const char *const *argv);
+/* End of input: it unloads everything. Its exit status must be 0. */
 void talk_end(struct talk *talk);
 
+/* A command, or several, one a line, whose answer comes with that of the next one. */
+void talk_say(struct talk *talk, const char *command);
 /* What a command prints, errors and messages that happen to come meanwhile included; static storage. */
 const char *talk_try(struct talk *talk, const char *command);
 /* Commands, one a line, none of which may fail. */

@@ -20,6 +20,8 @@ typedef enum {
 
 void rtapi_print(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void rtapi_print_msg(msg_level_t level, const char *format, ...) __attribute__((format(printf, 2, 3)));
+int rtapi_set_msg_level(int level);
+int rtapi_get_msg_level(void);
 int rtapi_snprintf(char *text, unsigned long size, const char *format, ...) __attribute__((format(printf, 3, 4)));
 int rtapi_vsnprintf(char *text, unsigned long size, const char *format, va_list args);
 long long rtapi_get_time(void);
