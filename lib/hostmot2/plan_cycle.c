@@ -269,11 +269,12 @@ uint64_t hm2_plan_requests(const struct hm2_plan *const plan)
 struct hm2_plan_tally hm2_plan_tally(const struct hm2_plan *const plan)
 {
     const uint8_t *const trailer = plan->reply + plan->reply_len - PLAN_TRAILER_BYTES;
+    const uint16_t came = hm2_get_le16(trailer + PLAN_TRAILER_RX_UDP),
+                   answered = hm2_get_le16(trailer - PLAN_REPLIES_BYTES);
     return (struct hm2_plan_tally){
-        .requests = (uint16_t)(plan->requests - 1u),
-        .writes = (uint16_t)(plan->write_at_request - plan->turns),
-        .came = hm2_get_le16(trailer + PLAN_TRAILER_RX_UDP),
-        .answered = hm2_get_le16(trailer - PLAN_REPLIES_BYTES),
+        .requests = (uint16_t)(answered - plan->requests + 1u),
+        .writes = (uint16_t)(came - answered - plan->write_at_request + plan->turns),
+        .answered = answered,
     };
 }
 
