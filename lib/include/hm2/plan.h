@@ -189,9 +189,10 @@ struct hm2_plan_tally {
     uint16_t answered; /* replies that the card had sent */
 };
 HM2_API struct hm2_plan_tally hm2_plan_tally(const struct hm2_plan *plan);
-/* Right after hm2_plan_judge() said LATE: the number of the request it answers. 0 when its words cannot be read,
- * because it is too old (64 requests) or was made before hm2_plan_reopen(). The same after it said STALE, when the card
- * has carried the request out twice; 0 when only its reply came twice. */
+/* Right after hm2_plan_judge() said LATE: the number of the request it answers. 0 when its words cannot be used,
+ * because it is too old (64 requests), was made before hm2_plan_reopen(), or the card had made it before the last FRESH
+ * one. The same after it said STALE, when the card has carried the request out once more; 0 when only its reply came
+ * twice. */
 HM2_API uint64_t hm2_plan_late_request(const struct hm2_plan *plan);
 /* Then: the read windows show the late reply until the next call, which brings the last fresh one back. */
 HM2_API void hm2_plan_swap_late(struct hm2_plan *plan);
