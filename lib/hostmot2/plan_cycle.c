@@ -213,21 +213,31 @@ static void accept(struct hm2_plan *const plan)
     settle_session(plan, hm2_get_le32(trailer + PLAN_TRAILER_SESSION));
 }
 
+static const uint8_t *trailer_of(const struct hm2_plan *const plan, const uint8_t *const reply)
+{
+    return reply + plan->reply_len - PLAN_TRAILER_BYTES;
+}
+
+/* By how many packets the card had received more when it made this reply than when it made the last fresh one: two that
+ * have overtaken each other are told by that, and a second one to the same request. */
+static int16_t packets_since(const struct hm2_plan *const plan)
+{
+    return hm2_delta16(hm2_get_le16(trailer_of(plan, plan->landing) + PLAN_TRAILER_RX_UDP),
+                       hm2_get_le16(trailer_of(plan, plan->reply) + PLAN_TRAILER_RX_UDP));
+}
+
+/* Does it answer the same request as the last fresh one? */
+static bool answers_again(const struct hm2_plan *const plan)
+{
+    return hm2_get_le32(trailer_of(plan, plan->landing) + PLAN_TRAILER_REQUEST) ==
+           hm2_get_le32(trailer_of(plan, plan->reply) + PLAN_TRAILER_REQUEST);
+}
+
 /* Its number, when it is remembered and was made in the present layout. */
 static uint64_t readable_request(const struct hm2_plan *const plan, const uint64_t age)
 {
     const uint64_t number = plan->requests - age;
     return age < 64 && number > plan->requests_before ? number : 0;
-}
-
-/* One more reply to the request that was answered last, with another count of packets: the card carried it out twice.
- */
-static bool is_second_answer(const struct hm2_plan *const plan)
-{
-    const size_t at = plan->reply_len - PLAN_TRAILER_BYTES;
-    const uint8_t *const first = plan->reply + at, *const second = plan->landing + at;
-    return hm2_get_le32(first + PLAN_TRAILER_REQUEST) == hm2_get_le32(second + PLAN_TRAILER_REQUEST) &&
-           hm2_get_le16(first + PLAN_TRAILER_RX_UDP) != hm2_get_le16(second + PLAN_TRAILER_RX_UDP);
 }
 
 enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
@@ -243,12 +253,12 @@ enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
     /* 64 requests are remembered. A reply to an older one counts as late: so old a duplicate is as good as that. */
     const uint64_t bit = age < 64 ? UINT64_C(1) << age : 0;
     if ((plan->answered & bit) != 0) {
-        plan->late_request = is_second_answer(plan) ? readable_request(plan, age) : 0;
+        plan->late_request = answers_again(plan) && packets_since(plan) > 0 ? readable_request(plan, age) : 0;
         return HM2_REPLY_STALE;
     }
     plan->answered |= bit;
     if (age > 0 || !plan->outstanding) {
-        plan->late_request = readable_request(plan, age);
+        plan->late_request = packets_since(plan) >= 0 ? readable_request(plan, age) : 0;
         return HM2_REPLY_LATE;
     }
     if (is_turn) {
@@ -269,11 +279,12 @@ uint64_t hm2_plan_requests(const struct hm2_plan *const plan)
 struct hm2_plan_tally hm2_plan_tally(const struct hm2_plan *const plan)
 {
     const uint8_t *const trailer = plan->reply + plan->reply_len - PLAN_TRAILER_BYTES;
+    const uint16_t came = hm2_get_le16(trailer + PLAN_TRAILER_RX_UDP),
+                   answered = hm2_get_le16(trailer - PLAN_REPLIES_BYTES);
     return (struct hm2_plan_tally){
-        .requests = (uint16_t)(plan->requests - 1u),
-        .writes = (uint16_t)(plan->write_at_request - plan->turns),
-        .came = hm2_get_le16(trailer + PLAN_TRAILER_RX_UDP),
-        .answered = hm2_get_le16(trailer - PLAN_REPLIES_BYTES),
+        .requests = (uint16_t)(answered - plan->requests + 1u),
+        .writes = (uint16_t)(came - answered - plan->write_at_request + plan->turns),
+        .answered = answered,
     };
 }
 

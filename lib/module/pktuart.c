@@ -215,13 +215,11 @@ static void drop_parts(struct pktuart *const p, const unsigned counted)
 
 /* A frame of one write that came twice is sent twice. With a part of a longer one whatever follows would be sent in its
  * place. */
-static void look_for_doubles(struct pktuart *const p)
+HM2_RARE static void look_for_double_parts(struct pktuart *const p)
 {
     const struct serial_passage *const passage = &p->port.passage;
     const bool now = p->frame_bytes > WRITE_BYTES;
-    const bool doubled = (passage->twice > 0 && p->turned) || (passage->writes_twice > 0 && now);
-    p->turned = now && p->port.turned_bytes > 0;
-    if (!doubled)
+    if ((passage->twice == 0 || !p->turned) && (passage->writes_twice == 0 || !now))
         return;
     if (now)
         drop_parts(p, 0);
@@ -231,7 +229,9 @@ static void look_for_doubles(struct pktuart *const p)
 static void take(struct hm2_serial *const port)
 {
     struct pktuart *const p = (struct pktuart *)port;
-    look_for_doubles(p);
+    if (port->passage.told)
+        look_for_double_parts(p);
+    p->turned = p->frame_bytes > WRITE_BYTES && port->turned_bytes > 0;
     take_sent(p);
     const enum pkt_rx_health health = pkt_rx_take(&p->rx, port);
     if (p->rx.clearing)

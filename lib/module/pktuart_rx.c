@@ -368,20 +368,24 @@ static void judge_unanswered(struct pkt_rx *const rx, const struct serial_passag
 /* Words and sizes do not belong together any longer when a request has taken some unseen, nor may there have been any
  * to take, which spoils the buffer. When it is not certain that it was a request which came twice, what it may have
  * taken is only counted. */
-static bool is_torn(struct pkt_rx *const rx, struct hm2_serial *const port)
+HM2_RARE static bool is_torn(const struct pkt_rx *const rx, struct hm2_serial *const port)
 {
-    const bool popped = rx->popped_words > 0 || rx->popped_counts > 0;
-    if (popped && !port->passage.stray)
+    if (!port->passage.stray)
         port->counts.rx_uncertain += WORD_BYTES * rx->popped_words * port->passage.twice;
+    return port->passage.stray;
+}
+
+static void note_popped(struct pkt_rx *const rx)
+{
     rx->popped_request = rx->request;
     rx->popped_words = rx->asked_words;
     rx->popped_counts = rx->asked_counts;
-    return port->passage.stray;
 }
 
 enum pkt_rx_health pkt_rx_take(struct pkt_rx *const rx, struct hm2_serial *const port)
 {
-    const bool torn = is_torn(rx, port);
+    const bool torn = port->passage.told && is_torn(rx, port);
+    note_popped(rx);
     if (!rx->clearing && (torn || (rx->unanswered && rx->doubt.on && !port->passage.unheard)))
         return PKT_RX_LOST;
     if (rx->unanswered)

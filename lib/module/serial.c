@@ -177,7 +177,8 @@ static void show_counts(struct hm2_serial *const port)
 
 struct ports {
     bool tallied;
-    struct hm2_plan_tally tally; /* as of the last good reply */
+    struct hm2_plan_tally tally;   /* as of the last good reply */
+    struct serial_passage passage; /* up to it, when it is told */
     struct hm2_serial *port[];
 };
 
@@ -249,45 +250,60 @@ void serial_start(struct hm2_module *const module, const struct hm2_cycle *const
         ports->tallied = false;
 }
 
-static unsigned beyond(const unsigned came, const unsigned sent)
+static unsigned risen(const uint16_t now, const uint16_t before)
 {
-    return came > sent ? came - sent : 0;
+    return hm2_delta16(now, before) > 0 ? (unsigned)hm2_delta16(now, before) : 0;
 }
 
 /* The request before was answered. When the card has sent no other reply, no other request has come. */
-static struct serial_passage look_back(struct ports *const ports, const struct hm2_plan *const plan)
+HM2_RARE static struct serial_passage compare(const struct hm2_plan_tally *const now,
+                                              const struct hm2_plan_tally *const before)
+{
+    return (struct serial_passage){.told = true,
+                                   .twice = risen(now->requests, before->requests),
+                                   .writes_twice = risen(now->writes, before->writes),
+                                   .unheard = (uint16_t)(now->answered - before->answered) <= 1u};
+}
+
+static inline void look_back(struct ports *const ports, const struct hm2_plan *const plan)
 {
     const struct hm2_plan_tally now = hm2_plan_tally(plan), before = ports->tally;
-    const uint16_t requests = (uint16_t)(now.requests - before.requests),
-                   writes = (uint16_t)(now.writes - before.writes);
-    const uint16_t came = (uint16_t)(now.came - before.came), answered = (uint16_t)(now.answered - before.answered);
-    const bool tallied = ports->tallied;
+    const bool differs = now.requests != before.requests || now.writes != before.writes;
+    ports->passage.told = differs && ports->tallied;
+    if (ports->passage.told)
+        ports->passage = compare(&now, &before);
     ports->tally = now;
     ports->tallied = true;
-    return (struct serial_passage){.twice = tallied ? beyond(answered, requests) : 0,
-                                   .writes_twice = tallied ? beyond(beyond(came, answered), writes) : 0,
-                                   .unheard = tallied && answered <= 1u};
 }
 
 /* Whoever sees a stray request knows that one more came, also when another was lost. */
-static void see_passage(struct hm2_serial *const port, const struct serial_passage passage)
+HM2_RARE static void see_passage(struct hm2_serial *const port, const struct serial_passage *const passage)
 {
-    port->passage = passage;
+    port->passage = passage->told ? *passage : (struct serial_passage){.told = port->stray};
     port->passage.stray = port->stray;
-    if (port->stray && passage.twice == 0)
+    if (port->stray && port->passage.twice == 0)
         port->passage.twice = 1;
     port->stray = false;
 }
 
 /* What a write handed to the card may have come to it twice: that of a turn before the last reply, that of a plain
  * cycle behind it. */
-static void count_twice(struct hm2_serial *const port, const bool turned)
+HM2_RARE static void count_twice(struct hm2_serial *const port, const bool in_this_turn)
 {
-    const bool in_this_turn = turned && !port->held;
     if (port->passage.twice > 0)
         port->counts.tx_uncertain += port->turned_bytes;
     if (port->passage.writes_twice > 0 && !in_this_turn)
         port->counts.tx_uncertain += port->sent_bytes;
+}
+
+static inline void look_for_doubles(struct hm2_serial *const port, const struct serial_passage *const passage,
+                                    const bool turned)
+{
+    const bool in_this_turn = turned && !port->held;
+    if (passage->told || port->passage.told || port->stray) {
+        see_passage(port, passage);
+        count_twice(port, in_this_turn);
+    }
     port->turned_bytes = in_this_turn ? port->sent_bytes : 0;
 }
 
@@ -318,20 +334,19 @@ static void take(struct hm2_serial *const port)
 
 void serial_unpack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
-    struct serial_passage passage;
+    struct ports *const ports = module->context;
     bool looked = false;
     for (unsigned unit = 0; unit < module->instances; unit++) {
         struct hm2_serial *const port = open_port(module, unit);
         if (!port || !port->awaiting)
             continue;
         if (!looked)
-            passage = look_back(module->context, port->plan);
+            look_back(ports, port->plan);
         looked = true;
         port->awaiting = false;
         port->sent_ns = cycle->now_ns;
         port->now_ns = cycle->received_ns;
-        see_passage(port, passage);
-        count_twice(port, cycle->turned);
+        look_for_doubles(port, &ports->passage, cycle->turned);
         if (port->held)
             take_held(port, cycle);
         else

@@ -79,6 +79,7 @@ struct queue_place queue_place(struct queue *queue, unsigned words, unsigned n);
 /* What a reply tells of the datagrams between it and the good one before: that one's request, and all that were sent
  * after it. */
 struct serial_passage {
+    bool told; /* there is something else here than nothing */
     /* So many more have come than were sent: some came twice, or somebody else talks to the card. */
     unsigned twice;        /* requests, and turns */
     unsigned writes_twice; /* plain ones */

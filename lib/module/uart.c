@@ -46,7 +46,6 @@ struct uart {
     bool again;
     unsigned known, free_words;
     struct asked asked;                  /* in the last request */
-    bool popped;                         /* the one that was answered last has asked for something */
     unsigned left, taken;                /* bytes: that it left in the card; that came since */
     unsigned gone;                       /* with requests since that will not be answered, at most */
     int64_t left_ns;                     /* not sooner */
@@ -114,7 +113,6 @@ static int set_port(struct hm2_serial *const port, const struct hm2_serial_setti
     hm2_section_touch(&u->tx_clear);
     hm2_section_touch(&u->rx_clear);
     u->known = u->free_words = u->unanswered_count = u->left = u->taken = u->gone = 0;
-    u->popped = false;
     u->asked = (struct asked){0};
     return 0;
 }
@@ -167,20 +165,20 @@ HM2_RARE static void count_missing(struct uart *const u, const unsigned doubted)
 {
     const struct serial_passage *const passage = &u->port.passage;
     const unsigned bound = missing_most(u), gone = passage->unheard ? 0 : u->gone;
-    const unsigned twice = u->popped || passage->stray ? passage->twice * POPPED_MOST : 0;
-    const unsigned most = gone + twice + doubted;
+    const unsigned most = gone + passage->twice * POPPED_MOST + doubted;
     u->port.counts.rx_uncertain += most < bound ? most : bound;
 }
 
 static void take_asked(struct uart *const u)
 {
-    const unsigned doubted = u->port.passage.stray ? u->asked.popped : 0;
-    drop_unanswered(u, u->unanswered_count); /* a later reply is here already */
+    const bool told = u->port.passage.told;
+    const unsigned doubted = told && u->port.passage.stray ? u->asked.popped : 0;
+    if (u->unanswered_count > 0)
+        drop_unanswered(u, u->unanswered_count); /* a later reply is here already */
     u->asked.popped -= doubted;
     take_bytes(u, u->asked);
-    if (u->gone > 0 || u->port.passage.twice > 0)
+    if (told || u->gone > 0)
         count_missing(u, doubted);
-    u->popped = u->asked.fours;
     u->asked = (struct asked){0};
     u->known = u->left = count_at(u, POPS);
     u->left_ns = u->port.sent_ns;

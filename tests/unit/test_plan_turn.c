@@ -148,14 +148,16 @@ static void a_turn_counts_as_a_request(void **state)
     size_t len;
     freeze(f);
     turn(f);
-    assert_int_equal(hm2_plan_tally(f->plan).requests, 0);
-    assert_int_equal(hm2_plan_tally(f->plan).writes, 0);
+    const struct hm2_plan_tally one = hm2_plan_tally(f->plan);
     turn(f);
-    assert_int_equal(hm2_plan_tally(f->plan).requests, 1);
+    const struct hm2_plan_tally two = hm2_plan_tally(f->plan);
+    assert_int_equal((uint16_t)(one.requests - two.requests), 1);
+    assert_int_equal(one.writes, two.writes);
     (void)hm2_plan_write(f->plan, &len);
     (void)hm2_plan_request(f->plan, &len);
-    assert_int_equal(hm2_plan_tally(f->plan).requests, 2);
-    assert_int_equal(hm2_plan_tally(f->plan).writes, 1);
+    const struct hm2_plan_tally three = hm2_plan_tally(f->plan);
+    assert_int_equal((uint16_t)(two.requests - three.requests), 1);
+    assert_int_equal((uint16_t)(two.writes - three.writes), 1);
 }
 
 static void sections_of_a_lost_turn_are_sent_again(void **state)

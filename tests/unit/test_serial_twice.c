@@ -28,7 +28,7 @@ static const struct row rows[] = {
 #define QUIET       60u /* periods without a byte end a test */
 #define HEARD_MAX   65536u
 
-enum fault { CALM, TWICE, LOST, STRANGER };
+enum fault { CALM, TWICE, LOST, STRANGER, OVERTAKEN };
 
 /* What happens every FAULT_EVERY cycles, to a request or to a write; a turn is both. */
 struct weather {
@@ -59,7 +59,8 @@ static struct sim_faults faults_of(const enum fault fault)
     return (struct sim_faults){.seed = 1,
                                .loss = fault == LOST ? 1.0 : 0.0,
                                .duplicate = fault == TWICE ? 1.0 : 0.0,
-                               .foreign = fault == STRANGER ? 1.0 : 0.0};
+                               .foreign = fault == STRANGER ? 1.0 : 0.0,
+                               .reorder = fault == OVERTAKEN ? 1.0 : 0.0};
 }
 
 static void set_faults(const struct line *const l, const enum fault fault)
@@ -177,7 +178,7 @@ static void each(const struct weather weather, const bool pipelined, const run_f
         const struct hm2_serial_counts counts = hm2_serial_counts(l.port);
         const struct sim_net_truth truth = sim_net_truth(l.bench->net);
         const unsigned d = weather.replies;
-        assert_true(truth.duplicated[d] + truth.lost[d] + truth.foreign[d] > 2);
+        assert_true(truth.duplicated[d] + truth.lost[d] + truth.foreign[d] + truth.reordered[d] > 2);
         assert_true(l.put == l.row->bytes);
         check(&l, &counts);
         close_line(&l);
@@ -244,6 +245,16 @@ static void what_a_turn_that_comes_twice_sends_again_is_counted(void **state)
 {
     (void)state;
     each((struct weather){.fault = TWICE, .write = true}, true, send_all, doubled_is_counted);
+}
+
+/* It was given up, and takes bytes when nobody reckons with that any more; or it had taken them long before. */
+static void what_a_request_or_reply_that_is_overtaken_takes_along_is_counted(void **state)
+{
+    (void)state;
+    each((struct weather){.fault = OVERTAKEN}, false, receive_all, missing_is_counted);
+    each((struct weather){.fault = OVERTAKEN, .write = true}, true, receive_all, missing_is_counted);
+    for (unsigned pipelined = 0; pipelined < 2; pipelined++)
+        each((struct weather){.fault = OVERTAKEN, .replies = true}, pipelined, receive_all, missing_is_counted);
 }
 
 static void replies_that_come_twice_cost_nothing(void **state)
@@ -349,6 +360,7 @@ int main(void)
         cmocka_unit_test(what_a_write_that_comes_twice_sends_again_is_counted),
         cmocka_unit_test(what_a_turn_that_comes_twice_sends_again_is_counted),
         cmocka_unit_test(a_part_of_a_frame_that_comes_twice_spoils_no_other_frame),
+        cmocka_unit_test(what_a_request_or_reply_that_is_overtaken_takes_along_is_counted),
         cmocka_unit_test(replies_that_come_twice_cost_nothing),
         cmocka_unit_test(a_write_that_is_carried_out_twice_takes_nothing_and_a_request_sends_nothing),
         cmocka_unit_test(a_stranger_costs_nothing),

@@ -181,16 +181,18 @@ HM2_API enum hm2_reply hm2_plan_judge(struct hm2_plan *plan, size_t len);
 /* Requests made so far: the next one is one more. For modules whose reads take something away (FIFOs) and must know a
  * late reply as the answer to theirs. */
 HM2_API uint64_t hm2_plan_requests(const struct hm2_plan *plan);
-/* What was sent, and what the card had got, before the request that was answered last; all modulo 2^16 and with others'
- * datagrams in the card's counts. For plans that read queues, and right after FRESH. */
+/* Before the request that was answered last: what more had come to the card than was made, modulo 2^16. From one reply
+ * to the next this rises by what came twice or from somebody else, and falls by what was lost. Turns are requests;
+ * those that are made again are not counted. For plans that read queues, and right after FRESH. */
 struct hm2_plan_tally {
-    uint16_t requests, writes; /* made; a turn counts as a request, one that was made again not */
-    uint16_t came, answered;   /* UDP packets that the card received, replies that it sent */
+    uint16_t requests, writes;
+    uint16_t answered; /* replies that the card had sent */
 };
 HM2_API struct hm2_plan_tally hm2_plan_tally(const struct hm2_plan *plan);
-/* Right after hm2_plan_judge() said LATE: the number of the request it answers. 0 when its words cannot be read,
- * because it is too old (64 requests) or was made before hm2_plan_reopen(). The same after it said STALE, when the card
- * has carried the request out twice; 0 when only its reply came twice. */
+/* Right after hm2_plan_judge() said LATE: the number of the request it answers. 0 when its words cannot be used,
+ * because it is too old (64 requests), was made before hm2_plan_reopen(), or the card had made it before the last FRESH
+ * one. The same after it said STALE, when the card has carried the request out once more; 0 when only its reply came
+ * twice. */
 HM2_API uint64_t hm2_plan_late_request(const struct hm2_plan *plan);
 /* Then: the read windows show the late reply until the next call, which brings the last fresh one back. */
 HM2_API void hm2_plan_swap_late(struct hm2_plan *plan);
