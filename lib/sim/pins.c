@@ -29,6 +29,17 @@ static enum sim_level output_of(struct sim_module *const m, const unsigned unit,
     return m->ops->output(m, unit, secondary_pin);
 }
 
+unsigned sim_pad_of(const struct hm2_idrom *const idrom, const uint8_t gtag, const unsigned unit,
+                    const uint8_t secondary_pin)
+{
+    for (unsigned io = 0; io < idrom->pin_count; io++) {
+        const struct hm2_pd *const pd = &idrom->pins[io];
+        if (pd->secondary_tag == gtag && pd->secondary_unit == unit && pd->secondary_pin == secondary_pin)
+            return io;
+    }
+    return SIM_NO_PAD;
+}
+
 void sim_pins_connect(struct sim_card *const card)
 {
     for (unsigned io = 0; io < card->idrom.pin_count; io++) {
@@ -175,13 +186,24 @@ static void report(struct sim_card *const card, const unsigned number, const int
         card->on_edge(card->on_edge_context, clk, ps, number, level);
 }
 
+static void look_at_all_pads(struct sim_card *const card)
+{
+    card->pads_stale = false;
+    for (unsigned io = 0; io < card->idrom.pin_count; io++)
+        look_at_pad(card, io);
+    for (unsigned i = 0; i < card->module_count; i++) {
+        struct sim_module *const m = &card->modules[i];
+        if (!m->ops->ports_changed)
+            continue;
+        sim_sync(m);
+        m->ops->ports_changed(m);
+    }
+}
+
 void sim_pins_settle(struct sim_card *const card, const int64_t clk)
 {
-    if (card->pads_stale) {
-        card->pads_stale = false;
-        for (unsigned io = 0; io < card->idrom.pin_count; io++)
-            look_at_pad(card, io);
-    }
+    if (card->pads_stale)
+        look_at_all_pads(card);
     settle_wires(card);
     for (unsigned i = 0; i < card->watch_count; i++)
         report(card, i, clk, 0, level_of(card, &card->watches[i]));

@@ -3,6 +3,8 @@
 #ifndef SIM_CARD_H
 #define SIM_CARD_H
 
+#include <limits.h>
+
 #include <hm2/sim.h>
 
 #define SIM_NEVER INT64_MAX
@@ -54,6 +56,9 @@ struct sim_module_ops {
     void (*serial_attach)(struct sim_module *m, unsigned unit, sim_serial_fn sent, void *context);
     struct serial_feed *(*serial_feed)(struct sim_module *m, unsigned unit);
     void (*bite)(struct sim_module *m); /* the watchdog bit: outputs that it clears. May be NULL */
+    /* Port registers changed at the edge before the present clk, and with them, perhaps, which pads carry outputs of
+     * the module. Called after power_up, too. May be NULL. */
+    void (*ports_changed)(struct sim_module *m);
 };
 
 /* The card asks the IOPort model (one module, unit = port) for what it drives on bit b of a port as
@@ -97,6 +102,9 @@ void sim_bite(struct sim_card *card);
 void sim_watch_module(struct sim_module *m);
 /* A port register has another value than before: the pads are looked at again. Called by the IOPort model. */
 void sim_pads_changed(struct sim_card *card);
+/* The pad behind which an output is, SIM_NO_PAD when there is none. */
+#define SIM_NO_PAD UINT_MAX
+unsigned sim_pad_of(const struct hm2_idrom *idrom, uint8_t gtag, unsigned unit, uint8_t secondary_pin);
 /* Level of the secondary output behind a pad (SIM_LOW when it has none, or no model). */
 enum sim_level sim_alternate(struct sim_card *card, unsigned io);
 /* The secondary output behind a pad reaches it: the port registers say so. */
@@ -111,8 +119,11 @@ enum sim_level sim_pad_outside(const struct sim_card *card, unsigned io);
 int64_t sim_dpll_last_rise(struct sim_card *card, unsigned timer, int64_t clk);
 int64_t sim_dpll_next_rise(struct sim_card *card, unsigned timer, int64_t clk);
 
-/* Position of a step generator at the module's present clk, 48.. bits: steps * 2^32 (for followers). */
+/* Position of a step generator at the module's present clk, 48.. bits: steps * 2^32. */
 int64_t sim_stepgen_position(struct sim_card *card, unsigned stepgen);
+/* Likewise that of a motor which makes its steps (for followers). It rests while the generator's first output does not
+ * reach its pad; the whole steps that the generator makes meanwhile are left out. */
+int64_t sim_stepgen_motor(struct sim_card *card, unsigned stepgen);
 /* Likewise how far a motor has turned by a PWM generator's signed duty, while it was enabled and, as far as the looks
  * at this position can tell, drove its pin: seconds at full duty * 2^32. */
 int64_t sim_pwmgen_position(struct sim_card *card, unsigned pwmgen);

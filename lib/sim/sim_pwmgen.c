@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* PWMGen, tag 06: PWM and PDM generators clocked by ClockHigh (register map 3.6, traces in folder pwmgen). */
-#include <limits.h>
 #include <string.h>
 
 #include "high_clock.h"
 #include "pwm_logic.h"
 #include "sim_card.h"
 
-#define INSTANCES_MAX 64u /* address bits 7..2 select the instance (1.1) */
-#define NO_PIN        UINT_MAX
+#define INSTANCES_MAX 64u  /* address bits 7..2 select the instance (1.1) */
 #define DUTY_ONE      4096 /* pwm_duty() */
 #define PIN_A         0x81u
 #define PIN_B         0x82u
@@ -24,23 +22,13 @@ struct pwmgens {
     int64_t edges;                                      /* of ClockHigh that have been made */
     int64_t duty[INSTANCES_MAX];                        /* sum of edges * duty while enabled, */
     int64_t seen[INSTANCES_MAX], turned[INSTANCES_MAX]; /* at the last look, and of that what reached the pin */
-    unsigned io[INSTANCES_MAX];                         /* of the pulses; NO_PIN = on no pad */
+    unsigned io[INSTANCES_MAX];                         /* of the pulses; SIM_NO_PAD = on none */
     struct pwm_reference reference;
     struct pwm_channel channels[INSTANCES_MAX];
 };
 
 /* ---- life
  * --------------------------------------------------------------------------------------------------------------- */
-
-static unsigned pulse_pin(const struct hm2_idrom *const idrom, const unsigned unit)
-{
-    for (unsigned io = 0; io < idrom->pin_count; io++) {
-        const struct hm2_pd *const pd = &idrom->pins[io];
-        if (pd->secondary_tag == HM2_GTAG_PWMGEN && pd->secondary_unit == unit && pd->secondary_pin == PIN_A)
-            return io;
-    }
-    return NO_PIN;
-}
 
 static int init(struct sim_module *const m)
 {
@@ -49,7 +37,7 @@ static int init(struct sim_module *const m)
         return HM2_ERR_RANGE;
     p->count = m->md.instances < INSTANCES_MAX ? m->md.instances : INSTANCES_MAX;
     for (unsigned i = 0; i < p->count; i++)
-        p->io[i] = pulse_pin(sim_idrom(m->card), i);
+        p->io[i] = sim_pad_of(sim_idrom(m->card), HM2_GTAG_PWMGEN, i, PIN_A);
     p->enable_mask = p->count >= 32 ? UINT32_MAX : (1u << p->count) - 1;
     return 0;
 }
@@ -170,7 +158,7 @@ int64_t sim_pwmgen_position(struct sim_card *const card, const unsigned pwmgen)
     const wide one = (wide)sim_clock_high_hz(card) * DUTY_ONE; /* full duty for a second */
     if (pwmgen >= p->count || one == 0)
         return 0;
-    if (p->io[pwmgen] == NO_PIN || sim_card_pad(card, p->io[pwmgen]) != SIM_FLOAT)
+    if (p->io[pwmgen] == SIM_NO_PAD || sim_card_pad(card, p->io[pwmgen]) != SIM_FLOAT)
         p->turned[pwmgen] += p->duty[pwmgen] - p->seen[pwmgen];
     p->seen[pwmgen] = p->duty[pwmgen];
     const wide scaled = (wide)p->turned[pwmgen] * (1LL << 32);

@@ -6,7 +6,7 @@
 #include "map.h"
 #include "sim_qcounter.h"
 
-#define STEP_ONE (1LL << 32) /* of sim_stepgen_position() */
+#define STEP_ONE (1LL << 32) /* of sim_stepgen_motor() */
 
 /* ---- life
  * ------------------------------------------------------------------------------------------------------------- */
@@ -251,7 +251,7 @@ int sim_card_follow(struct sim_card *const card, const unsigned encoder, const u
     if (den <= 0)
         return HM2_ERR_RANGE;
     return sim_qc_follow(card, encoder,
-                         &(struct sim_follow){sim_stepgen_position, .unit = stepgen, .num = num, .den = den});
+                         &(struct sim_follow){sim_stepgen_motor, .unit = stepgen, .num = num, .den = den});
 }
 
 int sim_card_motor(struct sim_card *const card, const unsigned encoder, const unsigned pwmgen,
@@ -282,7 +282,7 @@ int sim_card_turned(struct sim_card *const card, const uint8_t gtag, const unsig
     if (!m || unit >= m->md.instances)
         return HM2_ERR_NOTFOUND;
     if (gtag == HM2_GTAG_STEPGEN) {
-        const int64_t steps = sim_stepgen_position(card, unit);
+        const int64_t steps = sim_stepgen_motor(card, unit);
         *position = steps / STEP_ONE - (steps % STEP_ONE < 0);
         return 0;
     }

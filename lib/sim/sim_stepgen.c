@@ -21,6 +21,8 @@ enum {
 #define DPLL_SELECT_ENABLE 0x8000u /* [15] enable, [14:12] timer; the rest is not stored */
 #define DPLL_SELECT_MASK   0xF000u
 
+#define FIRST_OUTPUT 0x81u
+
 #define MODE_BITS_PLAIN 0x3u
 #define MODE_BIT_SWAP   0x4u /* versions 0x42 and 0xC2 swap the two outputs */
 
@@ -29,6 +31,10 @@ struct instance {
     uint32_t latched; /* new map: what register 1 reads */
     struct sim_latch_filter filter[SIM_LATCH_INPUTS];
     uint32_t index_position; /* what index or probe latched: bits 47..16 of the accumulator */
+    /* The motor (sim_stepgen_motor()). */
+    bool rests;
+    int64_t rested_at; /* travel when it began to rest; */
+    uint64_t left_out; /* whole steps * 2^32 that it has not made */
 };
 
 struct stepgens {
@@ -42,6 +48,7 @@ struct stepgens {
     /* The edge after a write to the select register compares the newly chosen timer with what the old one was. */
     int64_t switched_clk;
     bool switch_latches;
+    unsigned io[INSTANCES_MAX]; /* of the first outputs; SIM_NO_PAD = on none */
     struct instance instances[INSTANCES_MAX];
 };
 
@@ -52,6 +59,8 @@ static int init(struct sim_module *const m)
     s->count = m->md.instances < INSTANCES_MAX ? m->md.instances : INSTANCES_MAX;
     s->has_dpll_select = sim_map_is_new(idrom) && hm2_idrom_find(idrom, HM2_GTAG_DPLL);
     s->latch = sim_latch_kind(m->md.version);
+    for (unsigned i = 0; i < s->count; i++)
+        s->io[i] = sim_pad_of(idrom, HM2_GTAG_STEPGEN, i, FIRST_OUTPUT);
     s->swaps_outputs = m->md.version == 0x42 || m->md.version == 0xC2;
     s->mode_bits = MODE_BITS_PLAIN;
     if (s->swaps_outputs)
@@ -277,13 +286,46 @@ static enum sim_level output(struct sim_module *const m, const unsigned unit, co
     return outputs >> number & 1u ? SIM_HIGH : SIM_LOW;
 }
 
-int64_t sim_stepgen_position(struct sim_card *const card, const unsigned stepgen)
+/* ---- position
+ * ------------------------------------------------------------------------------------------------------
+ */
+
+static uint64_t whole_steps(const int64_t travel)
+{
+    return (uint64_t)travel & ~(uint64_t)UINT32_MAX;
+}
+
+static void ports_changed(struct sim_module *const m)
+{
+    struct stepgens *const s = m->state;
+    for (unsigned i = 0; i < s->count; i++) {
+        struct instance *const one = &s->instances[i];
+        const bool rests = s->io[i] != SIM_NO_PAD && !sim_pad_carries_alternate(m->card, s->io[i]);
+        if (rests && !one->rests)
+            one->rested_at = one->gen.travel;
+        if (!rests && one->rests)
+            one->left_out += whole_steps(one->gen.travel) - whole_steps(one->rested_at);
+        one->rests = rests;
+    }
+}
+
+static const struct instance *instance_of(struct sim_card *const card, const unsigned stepgen)
 {
     const struct sim_module *const m = sim_find(card, HM2_GTAG_STEPGEN);
-    if (!m)
-        return 0;
-    const struct stepgens *const s = m->state;
-    return stepgen < s->count ? s->instances[stepgen].gen.travel : 0;
+    const struct stepgens *const s = m ? m->state : NULL;
+    return s && stepgen < s->count ? &s->instances[stepgen] : NULL;
+}
+
+int64_t sim_stepgen_position(struct sim_card *const card, const unsigned stepgen)
+{
+    const struct instance *const one = instance_of(card, stepgen);
+    return one ? one->gen.travel : 0;
+}
+
+int64_t sim_stepgen_motor(struct sim_card *const card, const unsigned stepgen)
+{
+    const struct instance *const one = instance_of(card, stepgen);
+    return one ? (int64_t)((uint64_t)(one->rests ? one->rested_at : one->gen.travel) - one->left_out) : 0;
 }
 
 const struct sim_module_ops sim_stepgen_ops = {
@@ -299,4 +341,5 @@ const struct sim_module_ops sim_stepgen_ops = {
     .output = output,
     .input = input,
     .next_event = next_event,
+    .ports_changed = ports_changed,
 };

@@ -6,12 +6,15 @@
 
 #include "module_rig.h"
 #include "module_types.h"
+#include "sim_card.h"
 #include "unit.h"
 
 #define CLOCK_NS 10
 
 /* Inputs of encoder 0 (register map 4.1). */
 enum { PIN_A = 0x01, PIN_B = 0x02, PIN_INDEX = 0x03 };
+/* Output of step generator 0, and what makes it reach a pad. */
+enum { PIN_STEP = 0x81, REG_DDR = 0x1100, REG_SOURCE = 0x1200 };
 
 struct bench {
     struct module_rig *rig;
@@ -71,12 +74,24 @@ static void turn(struct bench *const bench, const int direction)
     bench->rig->cycle.now_ns += 2000 * CLOCK_NS;
 }
 
+/* The board does that, which is not here: the steps reach their pad. */
+static void drive_step_pad(const struct bench *const bench)
+{
+    const struct hm2_idrom *const idrom = sim_card_idrom(bench->card);
+    const unsigned io = sim_pad_of(idrom, HM2_GTAG_STEPGEN, 0, PIN_STEP);
+    const uint16_t port = (uint16_t)(4 * (io / idrom->port_width));
+    sim_card_write(bench->card, sim_card_clock(bench->card), (uint16_t)(REG_DDR + port), 1u << io % idrom->port_width);
+    sim_card_write(bench->card, sim_card_clock(bench->card), (uint16_t)(REG_SOURCE + port),
+                   1u << io % idrom->port_width);
+}
+
 static void an_encoder_on_the_motor_measures_what_was_commanded(void **state)
 {
     (void)state;
     struct bench bench = bench_open("7i96s");
     struct module_rig *const rig = bench.rig;
     assert_int_equal(sim_card_follow(bench.card, 0, 0, 4, 1), 0);
+    drive_step_pad(&bench);
     rig_set(rig, "encoder.00.scale", 4000);
     set_up_generator(&bench);
     double command = 0.0;

@@ -319,8 +319,40 @@ static void a_probe_edge_latches_and_disarms(void **state)
     sim_card_free(card);
 }
 
+#define PORTS      4u
+#define REG_DDR    0x1100u
+#define REG_SOURCE 0x1200u
+#define REG_INVERT 0x1400u
+
+/* The pads of a port that outputs of modules are behind; inputs stay what they are. */
+static uint32_t outputs_of(const struct sim_card *const card, const unsigned port)
+{
+    const struct hm2_idrom *const idrom = sim_card_idrom(card);
+    uint32_t mask = 0;
+    for (unsigned bit = 0; bit < idrom->port_width; bit++) {
+        const unsigned io = port * idrom->port_width + bit;
+        if (io < idrom->pin_count && (idrom->pins[io].secondary_pin & HM2_PIN_OUTPUT))
+            mask |= 1u << bit;
+    }
+    return mask;
+}
+
+static void write_ports(struct sim_card *const card, const int64_t clk, const unsigned reg, const bool set)
+{
+    for (unsigned port = 0; port < PORTS; port++)
+        sim_card_write(card, clk + port, (uint16_t)(reg + 4 * port), set ? outputs_of(card, port) : 0);
+}
+
+/* The outputs of the modules reach all of the pads that have some, within eight clocks. */
+static void drive_pads(struct sim_card *const card, const int64_t clk)
+{
+    write_ports(card, clk, REG_DDR, true);
+    write_ports(card, clk + PORTS, REG_SOURCE, true);
+}
+
 static void start_stepgen(struct sim_card *const card, const int64_t clk, const uint32_t rate)
 {
+    drive_pads(card, clk - 2 * PORTS);
     sim_card_write(card, clk, 0x2900, UINT32_MAX);
     sim_card_write(card, clk + 1, 0x2500, 10);
     sim_card_write(card, clk + 2, 0x2600, 10);
@@ -390,6 +422,7 @@ static void an_encoder_follows_its_step_generator_with_floor(void **state)
     for (unsigned i = 0; i < sizeof(ratios) / sizeof(ratios[0]); i++) {
         struct sim_card *const card = new_card("SVST8_4IM2_72", "7i93");
         assert_int_equal(sim_card_follow(card, 0, 1, ratios[i].num, ratios[i].den), 0);
+        drive_pads(card, 80);
         sim_card_write(card, 90, 0x2900, UINT32_MAX);
         for (unsigned s = 0; s < 2; s++) {
             sim_card_write(card, 100, (uint16_t)(0x2500 + 4 * s), 10);
@@ -456,8 +489,7 @@ static void a_motor_turns_its_encoder_at_the_speed_of_the_duty_while_it_is_enabl
     for (unsigned i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         struct sim_card *const card = new_card("SVST8_4IM2_72", "7i93");
         assert_int_equal(sim_card_motor(card, 0, 3, 80000), 0);
-        for (uint16_t port = 0; port < 3; port++)
-            sim_card_write(card, 5 + port, (uint16_t)(0x1100 + 4 * port), UINT32_MAX);
+        write_ports(card, 5, REG_DDR, true);
         sim_card_write(card, 10, 0x4200, 0xFFFF);
         sim_card_write(card, 11, 0x410C, rows[i].mode);
         sim_card_write(card, 12, 0x400C, rows[i].value);
@@ -488,6 +520,55 @@ static void a_motor_rests_when_its_pin_is_no_output_any_more(void **state)
     assert_true(llabs(end - 40000) <= 1);
     sim_card_write(card, 2 * (int64_t)CLK_PER_S, 0x1100, 0);
     assert_int_equal(turned(card, 3 * (int64_t)CLK_PER_S), end);
+    sim_card_free(card);
+}
+
+/* The pads are no outputs any more, or those of general-purpose bits; inverted they still carry steps. */
+static void a_follower_rests_while_the_steps_do_not_reach_their_pin(void **state)
+{
+    (void)state;
+    static const struct {
+        unsigned reg;
+        bool steps;
+    } rows[] = {{REG_DDR, false}, {REG_SOURCE, false}, {REG_INVERT, true}};
+    for (unsigned i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        struct sim_card *const card = new_card("SVST8_4IM2_72", "7i93");
+        assert_int_equal(sim_card_follow(card, 0, 0, 4, 1), 0);
+        start_stepgen(card, 100, 4294967u); /* 1 step per 1000 clocks */
+        /* Nothing looks at the encoder before and after: what counts is when the pads change. */
+        write_ports(card, 1000000, rows[i].reg, rows[i].steps);
+        const int64_t rest = turned(card, 2000000);
+        assert_true(llabs(rest - (rows[i].steps ? 8000 : 4000)) <= 5);
+        assert_int_equal(count_of(card, 2000000, NULL), rest);
+        drive_pads(card, 3000000);
+        assert_true(llabs(turned(card, 3000020) - (rows[i].steps ? 12000 : rest)) <= 5);
+        assert_true(llabs(turned(card, 4000000) - (rows[i].steps ? 16000 : rest + 4000)) <= 5);
+        /* The generator itself has run all the time. */
+        assert_true(abs((int)(sim_card_read(card, 4000001, 0x2100, NULL) >> 16) - 4000) <= 1);
+        sim_card_free(card);
+    }
+}
+
+static void a_follower_rests_before_its_pads_are_driven_and_after_a_bite(void **state)
+{
+    (void)state;
+    struct sim_card *const card = new_card("SVST8_4IM2_72", "7i93");
+    assert_int_equal(sim_card_follow(card, 0, 0, 4, 1), 0);
+    sim_card_write(card, 90, 0x2900, UINT32_MAX);
+    sim_card_write(card, 91, 0x2500, 10);
+    sim_card_write(card, 92, 0x2600, 10);
+    sim_card_write(card, 100, 0x2000, 4294967u);
+    assert_int_equal(turned(card, 500000), 0);
+    int64_t steps = -1;
+    assert_int_equal(sim_card_turned(card, HM2_GTAG_STEPGEN, 0, &steps), 0);
+    assert_int_equal(steps, 0);
+    drive_pads(card, 500000);
+    sim_card_write(card, 600000, 0x0C00, 400000); /* the watchdog's time */
+    const int64_t rest = turned(card, 2000000);
+    assert_true(llabs(rest - 2000) <= 5);
+    assert_int_equal(turned(card, 3000000), rest);
+    assert_int_equal(sim_card_turned(card, HM2_GTAG_STEPGEN, 0, &steps), 0);
+    assert_true(llabs(steps - rest / 4) <= 1);
     sim_card_free(card);
 }
 
@@ -598,6 +679,8 @@ int main(void)
         cmocka_unit_test(counts_are_those_of_the_selected_timer_s_last_rise),
         cmocka_unit_test(an_encoder_follows_its_step_generator_with_floor),
         cmocka_unit_test(a_follower_s_time_stamps_give_its_speed),
+        cmocka_unit_test(a_follower_rests_while_the_steps_do_not_reach_their_pin),
+        cmocka_unit_test(a_follower_rests_before_its_pads_are_driven_and_after_a_bite),
         cmocka_unit_test(a_motor_turns_its_encoder_at_the_speed_of_the_duty_while_it_is_enabled),
         cmocka_unit_test(a_motor_rests_when_its_pin_is_no_output_any_more),
         cmocka_unit_test(the_index_of_a_follower_latches_and_clears_where_it_is),

@@ -105,7 +105,8 @@ HM2_API int HM2_MUST_CHECK sim_card_absolute(struct sim_card *card, uint8_t gtag
                                              const struct sim_absolute *encoder);
 
 /* An encoder that turns with a step generator, in closed form: count = floor(steps * num / den) since the call,
- * with the time stamp that the last count would have. No edges, no cost per count. */
+ * with the time stamp that the last count would have. No edges, no cost per count. It rests while the generator's first
+ * output does not reach a pad that it has: steps of that time are left out. */
 HM2_API int HM2_MUST_CHECK sim_card_follow(struct sim_card *card, unsigned encoder, unsigned stepgen, int32_t num,
                                            int32_t den);
 /* The same with a motor whose drive takes a PWM generator for the commanded speed, and obeys at once: counts_per_s at
@@ -115,8 +116,8 @@ HM2_API int HM2_MUST_CHECK sim_card_motor(struct sim_card *card, unsigned encode
                                           int32_t counts_per_s);
 /* An encoder that follows or has a motor shows its index at every multiple of so many counts. */
 HM2_API int HM2_MUST_CHECK sim_card_index(struct sim_card *card, unsigned encoder, uint32_t counts);
-/* Where an axis is, since the card was made: counts of such an encoder (tag 04), whole steps of a step generator (05).
- */
+/* Where an axis is, since the card was made: counts of such an encoder (tag 04), whole steps of a motor at
+ * a step generator (05), which rests as such an encoder does. */
 HM2_API int HM2_MUST_CHECK sim_card_turned(struct sim_card *card, uint8_t gtag, unsigned unit, int64_t *position);
 
 #define SIM_RESOLVER_TURNS 1e6
