@@ -73,27 +73,11 @@ static void start_peer(const struct peer *const peer)
     process_start(&run, argv);
 }
 
-/* Check's own messages are short. */
-static void give_up(const char *const what)
-{
-    printf("%s\n", run.text);
-    fflush(stdout);
-    ck_abort_msg("%s, status %d", what, run.status);
-}
-
 /* False when this machine cannot run it, which was said then. */
 static bool run_peer(const struct peer *const peer)
 {
     start_peer(peer);
-    if (!process_wait_end(&run, PEER_LIMIT_MS)) {
-        process_stop(&run, SIGKILL, 0);
-        give_up("no end in time");
-    }
-    if (linuxcnc_skipped(&run))
-        return false;
-    if (run.status != 0)
-        give_up("an exit status that is not 0");
-    return true;
+    return linuxcnc_ends_well(&run, PEER_LIMIT_MS);
 }
 
 /* ---- what was recorded --------------------------------------------------------------------------------------------
@@ -199,7 +183,7 @@ static const char *shown(const char *const card, const char *const name)
     while ((at = strstr(at, full)) && at[len] != '\n' && at[len] != ' ')
         at++;
     if (!at)
-        give_up(full);
+        process_give_up(&run, full);
     while (at > run.text && at[-1] == ' ')
         at--;
     const char *const end = at;
@@ -262,7 +246,7 @@ START_TEST(our_component_runs_in_linuxcnc_with_the_same_hal_file)
     ck_assert_str_eq(shown(peer->card, "packet-malformed"), "0x00000000");
     ck_assert_str_eq(shown(peer->card, "write-lost"), "0x00000000");
     if (strstr(run.text, "ERROR"))
-        give_up("LinuxCNC complains");
+        process_give_up(&run, "LinuxCNC complains");
 }
 END_TEST
 

@@ -6,7 +6,6 @@
  */
 #include <check.h>
 #include <math.h>
-#include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -74,14 +73,6 @@ static const struct config configs[] = {
 
 static struct process run;
 
-/* Check's own messages are short. */
-static void give_up(const char *const what)
-{
-    printf("%s\n", run.text);
-    fflush(stdout);
-    ck_abort_msg("%s, status %d", what, run.status);
-}
-
 /* False when this machine cannot run it, which was said then. */
 static bool run_config(const struct config *const config)
 {
@@ -89,15 +80,7 @@ static bool run_config(const struct config *const config)
     snprintf(out, sizeof out, "%s/config-%s", TEST_BUILD, config->name);
     const char *const argv[] = {TEST_SOURCE "/tests/system/linuxcnc-config", TEST_BUILD, out, config->name, NULL};
     process_start(&run, argv);
-    if (!process_wait_end(&run, LIMIT_MS)) {
-        process_stop(&run, SIGKILL, 0);
-        give_up("no end in time");
-    }
-    if (linuxcnc_skipped(&run))
-        return false;
-    if (run.status != 0)
-        give_up("an exit status that is not 0");
-    return true;
+    return linuxcnc_ends_well(&run, LIMIT_MS);
 }
 
 /* What follows `start` on its line. */
@@ -105,7 +88,7 @@ static const char *said(const char *const start)
 {
     const char *line;
     if (!process_wait_line(&run, start, 0, &line))
-        give_up(start);
+        process_give_up(&run, start);
     return line + strlen(start);
 }
 
@@ -156,7 +139,7 @@ static void check_position(const struct config *const config, const char *const 
 {
     double at[JOINTS];
     if (sscanf(said(start), "%lf %lf %lf", &at[0], &at[1], &at[2]) != 3)
-        give_up(start);
+        process_give_up(&run, start);
     for (unsigned i = 0; i < JOINTS; i++)
         if (fabs(at[i] - config->end[i]) > accuracy)
             ck_abort_msg("%sjoint %u: %.6f, not %.6f", start, i, at[i], config->end[i]);
@@ -197,7 +180,7 @@ static void check_motors(const struct config *const config)
         snprintf(place, sizeof place, ": encoder %u at ", i);
         const char *const at = strstr(run.text, place);
         if (!at)
-            give_up(place);
+            process_give_up(&run, place);
         const double counts = strtod(at + strlen(place), NULL);
         const double expected = config->zero[i] + config->end[i] * config->scale[i];
         if (fabs(counts - expected) > config->exactness[i])

@@ -56,19 +56,11 @@ static const char *shell(const char *const command)
     return run.text;
 }
 
-/* Check's own messages are short. */
-static void give_up(const char *const what)
-{
-    printf("%s\n", run.text);
-    fflush(stdout);
-    ck_abort_msg("%s, status %d", what, run.status);
-}
-
 /* The command says what is wrong, or nothing. */
 static void expect_silence(const char *const command)
 {
     if (*shell(command) || run.status != 0)
-        give_up(command);
+        process_give_up(&run, command);
 }
 
 static bool can_build(void)
@@ -160,7 +152,7 @@ START_TEST(without_linuxcncs_development_files_the_build_says_which_package_has_
         shell("make -s -C $SOURCE BUILDDIR=$BUILD/no-linuxcnc HALCOMPILE=no-such-halcompile install-linuxcnc 2>&1");
     ck_assert_int_ne(run.status, 0);
     if (!strstr(text, "linuxcnc-uspace-dev") || !strstr(text, "no-such-halcompile"))
-        give_up("no package name");
+        process_give_up(&run, "no package name");
     ck_assert_int_ne(access(TEST_BUILD "/no-linuxcnc/linuxcnc", F_OK), 0);
 }
 END_TEST
@@ -286,16 +278,16 @@ static void check_loads(void)
 {
     const char *const after = strstr(run.text, "all unloaded");
     if (!after || strstr(run.text, "ERROR") || strstr(run.text, "rror:"))
-        give_up("LinuxCNC complains");
+        process_give_up(&run, "LinuxCNC complains");
     for (size_t i = 0; i < COMPONENTS; i++) {
         /* Twice shown with "ready" behind its name; the function follows. */
         if (components[i].arguments && count(run.text, components[i].function) < 2)
-            give_up(components[i].function);
+            process_give_up(&run, components[i].function);
         /* A line of the list; messages of the loads may come late. */
         char line[64];
         snprintf(line, sizeof line, " RT    %s ", components[i].name);
         if (strstr(after, line))
-            give_up("a component that was unloaded is still there");
+            process_give_up(&run, "a component that was unloaded is still there");
     }
     ck_assert_int_eq(access(TEST_BUILD "/linuxcnc-load/recorded", R_OK), 0); /* written when it is unloaded */
 }
@@ -309,12 +301,9 @@ START_TEST(every_module_loads_into_linuxcnc_as_an_ordinary_user_and_unloads_and_
     expect_silence("rm -rf $BUILD/linuxcnc-load; mkdir -p $BUILD/linuxcnc-load/hal");
     write_hal_file(hal);
     linuxcnc_tell("PEER_MODULES", TEST_BUILD "/linuxcnc");
-    process_run(&run, argv, LOAD_LIMIT_MS);
-    if (linuxcnc_skipped(&run))
-        return;
-    if (run.status != 0)
-        give_up("an exit status that is not 0");
-    check_loads();
+    process_start(&run, argv);
+    if (linuxcnc_ends_well(&run, LOAD_LIMIT_MS))
+        check_loads();
 }
 END_TEST
 

@@ -28,14 +28,6 @@
 
 static struct process run;
 
-/* Check's own messages are short. */
-static void give_up(const char *const what)
-{
-    printf("%s\n", run.text);
-    fflush(stdout);
-    ck_abort_msg("%s; status %d", what, run.status);
-}
-
 /* ---- mesaflash ----------------------------------------------------------------------------------------------------
  */
 
@@ -45,7 +37,7 @@ static void expect(const char *const *lines)
     for (; *lines; lines++) {
         at = strstr(at, *lines);
         if (!at)
-            give_up(*lines); /* not there, or not in its place */
+            process_give_up(&run, *lines); /* not there, or not in its place */
     }
 }
 
@@ -59,7 +51,7 @@ static void list_remotes(const struct simulator *const sim, const char *const de
             return;
         usleep(100000);
     }
-    give_up("mesaflash --sserial failed");
+    process_give_up(&run, "mesaflash --sserial failed");
 }
 
 static void try_mesaflash(const char *const *const options, const char *const device, const char *const verbose,
@@ -114,7 +106,7 @@ START_TEST(mesaflash_lists_7i77_7i77d_and_7i84_of_one_port)
                                         NULL};
     try_mesaflash(options, "7i93", NULL, lines);
     if (strstr(run.text, "channel 5"))
-        give_up("there is no remote at channel 5");
+        process_give_up(&run, "there is no remote at channel 5");
 }
 END_TEST
 
@@ -184,7 +176,7 @@ static bool end_peer(void)
     if (linuxcnc_skipped(&run))
         return false;
     if (run.status != 0)
-        give_up("not a good end");
+        process_give_up(&run, "not a good end");
     return true;
 }
 
@@ -214,7 +206,7 @@ static void expect_shown(const char *const name, const char *const what)
     if (strcmp(shown(name), what) == 0)
         return;
     printf("%s: expected \"%s\", got \"%s\"\n", name, what, shown(name));
-    give_up(name);
+    process_give_up(&run, name);
 }
 
 struct expected {
@@ -273,7 +265,7 @@ static void wait_for_outputs(void)
         (void)process_wait_end(&run, 100);
     }
     if (!run.ended)
-        give_up("the outputs do not come on");
+        process_give_up(&run, "the outputs do not come on");
 }
 
 static const char *const remote_option[] = {"--remote", "0:0=7i77", NULL};
@@ -332,7 +324,7 @@ START_TEST(six_loops_close_over_analog_outputs_and_muxed_encoders)
         snprintf(name, sizeof name, "encoder.%02u.position", i);
         ck_assert_int_eq(sscanf(shown(name), "%7s %7s %lf", kind, direction, &position), 3);
         if (fabs(position - positions[i]) > 0.05)
-            give_up(name);
+            process_give_up(&run, name);
     }
 }
 END_TEST

@@ -2,6 +2,7 @@
 #include "linuxcnc_peer.h"
 
 #include <check.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,17 +38,27 @@ bool linuxcnc_skipped(struct process *const run)
     return true;
 }
 
+bool linuxcnc_ends_well(struct process *const run, const int limit_ms)
+{
+    if (!process_wait_end(run, limit_ms)) {
+        process_stop(run, SIGKILL, 0);
+        process_give_up(run, "no end in time");
+    }
+    if (linuxcnc_skipped(run))
+        return false;
+    if (run->status != 0)
+        process_give_up(run, "an exit status that is not 0");
+    return true;
+}
+
 bool linuxcnc_run_to(struct process *const run, const char *const *const argv, const int limit_ms,
                      const char *const start, const char *const what, const char **const line)
 {
     process_run(run, argv, limit_ms);
     if (linuxcnc_skipped(run))
         return false;
-    if (run->status != 0 || !process_wait_line(run, start, 0, line)) {
-        printf("%s\n", run->text); /* Check's own messages are short */
-        fflush(stdout);
-        ck_abort_msg("%s, status %d", what, run->status);
-    }
+    if (run->status != 0 || !process_wait_line(run, start, 0, line))
+        process_give_up(run, what);
     return true;
 }
 

@@ -15,6 +15,9 @@ void linuxcnc_tell(const char *name, const char *value);
 /* True, and the script's reason printed as a skip, when it has ended because something is missing on this machine. */
 bool linuxcnc_skipped(struct process *run);
 
+/* Wait for the end of a script that was started. False when it was skipped; no end, or a bad one, fails the test. */
+bool linuxcnc_ends_well(struct process *run, int limit_ms);
+
 /* Run a script until its end; its HAL file says a line that begins with `start` when all is well, which *line (may be
  * NULL) points at. False when it was skipped; anything else fails the test, which says `what` then. */
 bool linuxcnc_run_to(struct process *run, const char *const *argv, int limit_ms, const char *start, const char *what,

@@ -206,6 +206,13 @@ int process_run(struct process *const process, const char *const *const argv, co
     return process_stop(process, SIGKILL, 0);
 }
 
+void process_give_up(const struct process *const process, const char *const what)
+{
+    printf("%s\n", process->text);
+    fflush(stdout);
+    ck_abort_msg("%s, status %d", what, process->status);
+}
+
 const char *process_find(const char *const program)
 {
     static char found[512];

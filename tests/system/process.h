@@ -58,6 +58,9 @@ int process_stop(struct process *process, int signal, int limit_ms);
 /* Start, wait for the end (SIGKILL after limit_ms), return the status. */
 int process_run(struct process *process, const char *const *argv, int limit_ms);
 
+/* Fail the test: print all that the program has printed, as Check's own messages are short, and say what is wrong. */
+_Noreturn void process_give_up(const struct process *process, const char *what);
+
 /* Full path of a program in PATH, or NULL. Static storage. */
 const char *process_find(const char *program);
 /* Full path of what the build made ("hm2sim"). Static storage, the last four calls stay valid. */

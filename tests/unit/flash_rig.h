@@ -31,6 +31,9 @@ int flash_rig_7i93(void **state);
 int flash_rig_7i96s(void **state);
 int flash_rig_unknown_chip(void **state); /* a 7I93 */
 int flash_rig_free(void **state);
+/* A test on one of them, by a name of its own. */
+#define ON_7I93(test)  ((struct CMUnitTest){#test " (7I93)", test, flash_rig_7i93, flash_rig_free, NULL})
+#define ON_7I96S(test) ((struct CMUnitTest){#test " (7I96S)", test, flash_rig_7i96s, flash_rig_free, NULL})
 
 /* Make another image the one to be written: a good one from a seed, or any. */
 void flash_rig_image(struct flash_rig *rig, uint64_t seed, bool fallback);

@@ -434,14 +434,6 @@ static void late_and_foreign_replies_change_nothing(void **state)
 
 int main(void)
 {
-#define ON_7I93(test)                                               \
-    {                                                               \
-#test " (7I93)", test, flash_rig_7i93, flash_rig_free, NULL \
-    }
-#define ON_7I96S(test)                                                \
-    {                                                                 \
-#test " (7I96S)", test, flash_rig_7i96s, flash_rig_free, NULL \
-    }
     const struct CMUnitTest tests[] = {
         ON_7I93(refuses_wrong_images_for_a_xilinx_card),
         ON_7I96S(refuses_wrong_images_for_an_efinix_card),

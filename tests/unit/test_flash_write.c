@@ -385,14 +385,6 @@ static void backs_up_and_restores_everything(void **state)
 
 int main(void)
 {
-#define ON_7I93(test)                                               \
-    {                                                               \
-#test " (7I93)", test, flash_rig_7i93, flash_rig_free, NULL \
-    }
-#define ON_7I96S(test)                                                \
-    {                                                                 \
-#test " (7I96S)", test, flash_rig_7i96s, flash_rig_free, NULL \
-    }
     const struct CMUnitTest tests[] = {
         ON_7I93(writes_an_image_and_its_filler),
         ON_7I96S(writes_an_image_and_its_filler),

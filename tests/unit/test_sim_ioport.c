@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "unit.h"
 
+#include "firmware_card.h"
 #include "idrom_files.h"
 #include "random.h"
 #include "sim_card.h"
@@ -16,20 +17,6 @@
 #define STEPGEN_MODE  0x2200
 #define STEPGEN_TABLE 0x2700
 #define STEPGEN_PAD   24 /* first output of step generator 0 in SVST4_4_48 */
-
-static struct sim_card *new_card(const char *const firmware, const char *const profile)
-{
-    struct hm2_image image;
-    if (firmware)
-        assert_true(replay_firmware(firmware, &image));
-    else
-        load_image(IDROM_7I96S, &image);
-    const struct sim_card_options options = {.profile = profile, .image = &image};
-    struct sim_card *card = NULL;
-    struct hm2_diag diag = {0};
-    assert_int_equal(sim_card_new(&card, &options, &diag), 0);
-    return card;
-}
 
 /* ---- traces -------------------------------------------------------------------------------------------------------
  */
@@ -61,7 +48,7 @@ static void the_recorded_truth_table_of_a_pad_is_matched(void **state)
     (void)state;
     size_t len = 0;
     char *const text = load_text(TEST_DATA "/ioport/truth.csv", &len);
-    struct sim_card *const card = new_card("SVST4_4_48", "7i93");
+    struct sim_card *const card = firmware_card("SVST4_4_48");
     sim_card_write(card, 0, STEPGEN_MODE, 3);
     unsigned rows = 0;
     for (const char *row = strchr(text, '\n'); row && row[1]; row = strchr(row + 1, '\n'))
@@ -77,7 +64,7 @@ static void the_recorded_truth_table_of_a_pad_is_matched(void **state)
 static void a_port_of_17_bits_ignores_and_reads_as_zero_what_lies_beyond(void **state)
 {
     (void)state;
-    struct sim_card *const card = new_card(NULL, "7i96s");
+    struct sim_card *const card = firmware_card(NULL);
     uint32_t undriven = 0;
     sim_card_write(card, 0, DDR(2), 0xFFFFFFFF);
     assert_int_equal(sim_card_read(card, 1, DDR(2), &undriven), 0x0001FFFF);
@@ -94,7 +81,7 @@ static void a_port_of_17_bits_ignores_and_reads_as_zero_what_lies_beyond(void **
 static void addresses_repeat_within_the_page(void **state)
 {
     (void)state;
-    struct sim_card *const card = new_card("SVST4_4_48", "7i93");
+    struct sim_card *const card = firmware_card("SVST4_4_48");
     sim_card_write(card, 0, (uint16_t)(DDR(1) + 0x40), 0x123456); /* bits 4..2 select the port */
     assert_int_equal(sim_card_read(card, 1, DDR(1), NULL), 0x123456);
     assert_int_equal(sim_card_read(card, 1, (uint16_t)(DDR(1) + 0xE0), NULL), 0x123456);
@@ -104,7 +91,7 @@ static void addresses_repeat_within_the_page(void **state)
 static void a_floating_pad_reads_as_not_driven(void **state)
 {
     (void)state;
-    struct sim_card *const card = new_card("SVST4_4_48", "7i93");
+    struct sim_card *const card = firmware_card("SVST4_4_48");
     uint32_t undriven = 0;
     assert_int_equal(sim_card_drive(card, 5, 3, SIM_FLOAT), 0);
     assert_int_equal(sim_card_drive(card, 5, 4, SIM_LOW), 0);
@@ -117,7 +104,7 @@ static void a_floating_pad_reads_as_not_driven(void **state)
 static void leds_are_the_top_bits_and_lit_when_low(void **state)
 {
     (void)state;
-    struct sim_card *const card = new_card("SVST4_4_48", "7i93");
+    struct sim_card *const card = firmware_card("SVST4_4_48");
     struct sim_module *const led = sim_find(card, HM2_GTAG_LED);
     assert_non_null(led);
     sim_card_write(card, 5, LED + 0x10, 0xA0000000); /* the whole page is one register */

@@ -2,10 +2,13 @@
 /* Simulated PWM generators against the recorded firmware, and skipped edges against edges made singly. */
 #include "unit.h"
 
+#include "firmware_card.h"
 #include "pwm_logic.h"
 #include "random.h"
 #include "sim_card.h"
 #include "trace_folder.h"
+
+#define FIRMWARE "SVST8_4IM2_72"
 
 static void the_recorded_generators_are_matched_at_every_edge_of_the_high_clock(void **state)
 {
@@ -173,16 +176,6 @@ static void on_edge(void *const context, const int64_t clk, const unsigned ps, c
     seen->last_ps = ps;
 }
 
-static struct sim_card *new_card(void)
-{
-    struct hm2_image image;
-    struct sim_card *card = NULL;
-    assert_true(replay_firmware("SVST8_4IM2_72", &image));
-    const struct sim_card_options options = {.profile = "7i93", .image = &image};
-    assert_int_equal(sim_card_new(&card, &options, NULL), 0);
-    return card;
-}
-
 static void start(struct sim_card *const card)
 {
     sim_card_write(card, 12, 0x4200, 0xFFFF);
@@ -195,7 +188,7 @@ static void what_is_watched_does_not_depend_on_when_the_card_is_asked(void **sta
     (void)state;
     struct seen seen[2] = {0};
     for (unsigned i = 0; i < 2; i++) {
-        struct sim_card *const card = new_card();
+        struct sim_card *const card = firmware_card(FIRMWARE);
         assert_int_equal(sim_card_watch_output(card, HM2_GTAG_PWMGEN, 1, 0x81), 0);
         sim_card_on_edge(card, on_edge, &seen[i]);
         start(card);
@@ -214,7 +207,7 @@ static void what_is_watched_does_not_depend_on_when_the_card_is_asked(void **sta
 static void an_output_that_nobody_watches_is_right_when_looked_at(void **state)
 {
     (void)state;
-    struct sim_card *const watched = new_card(), *const alone = new_card();
+    struct sim_card *const watched = firmware_card(FIRMWARE), *const alone = firmware_card(FIRMWARE);
     const int watch = sim_card_watch_output(watched, HM2_GTAG_PWMGEN, 1, 0x81);
     assert_true(watch >= 0);
     start(watched);
@@ -238,7 +231,7 @@ static void an_output_that_nobody_watches_is_right_when_looked_at(void **state)
 static void the_enable_register_is_as_wide_as_there_are_channels(void **state)
 {
     (void)state;
-    struct sim_card *const card = new_card();
+    struct sim_card *const card = firmware_card(FIRMWARE);
     sim_card_write(card, 10, 0x4400, UINT32_MAX);
     uint32_t undriven = 1;
     assert_int_equal(sim_card_read(card, 20, 0x4400, &undriven), 0xFF);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "unit.h"
 
+#include "firmware_card.h"
 #include "idrom_files.h"
 #include "random.h"
 #include "sim_card.h"
@@ -191,17 +192,6 @@ static void a_saturated_second_keeps_the_period_of_the_timers(void **state)
 #define MASTER_DDS  0x2900
 #define DPLL_SELECT 0x2A00
 
-static struct sim_card *new_7i96s(void)
-{
-    struct hm2_image image;
-    load_image(IDROM_7I96S, &image);
-    const struct sim_card_options options = {.profile = "7i96s", .image = &image};
-    struct sim_card *card = NULL;
-    struct hm2_diag diag = {0};
-    assert_int_equal(sim_card_new(&card, &options, &diag), 0);
-    return card;
-}
-
 static void start_motion_and_timers(struct sim_card *const card)
 {
     sim_card_write(card, 10, MASTER_DDS, 0xFFFFFFFF);
@@ -226,7 +216,7 @@ static void a_latched_position_is_that_of_the_edge_after_the_timer_rose(void **s
 {
     (void)state;
     struct random r = {1};
-    struct sim_card *const card = new_7i96s();
+    struct sim_card *const card = firmware_card(NULL);
     start_motion_and_timers(card);
     uint32_t select = 0, latched[2] = {0};
     bool was_high = timer_level(card, select);
@@ -257,12 +247,7 @@ static void a_latched_position_is_that_of_the_edge_after_the_timer_rose(void **s
 static void the_select_register_is_not_there_without_a_dpll(void **state)
 {
     (void)state;
-    struct hm2_image image;
-    assert_true(replay_firmware("SVST4_4_48", &image));
-    const struct sim_card_options options = {.profile = "7i93", .image = &image};
-    struct sim_card *card = NULL;
-    struct hm2_diag diag = {0};
-    assert_int_equal(sim_card_new(&card, &options, &diag), 0);
+    struct sim_card *const card = firmware_card("SVST4_4_48");
     uint32_t undriven = 0;
     sim_card_read(card, 10, DPLL_SELECT, &undriven);
     assert_int_equal(undriven, 0xFFFFFFFF);
@@ -377,7 +362,7 @@ static void version_c2_swaps_the_outputs(void **state)
 static void the_followers_position_goes_on_where_the_register_wraps(void **state)
 {
     (void)state;
-    struct sim_card *const card = new_7i96s();
+    struct sim_card *const card = firmware_card(NULL);
     sim_card_write(card, 10, MASTER_DDS, 0xFFFFFFFF);
     sim_card_write(card, 11, RATE, 0x40000000);
     sim_card_advance(card, 400011);

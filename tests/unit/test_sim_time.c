@@ -3,9 +3,8 @@
  * by clock with every module looked at, the other only where something happens. */
 #include "unit.h"
 
-#include "idrom_files.h"
+#include "firmware_card.h"
 #include "random.h"
-#include "replay.h"
 #include "sim_card.h"
 
 #define EDGES_MAX 20000u
@@ -34,15 +33,7 @@ static struct edges eager_edges, lazy_edges;
 
 static struct sim_card *new_card(const char *const firmware, struct edges *const edges, const bool watched)
 {
-    struct hm2_image image;
-    if (firmware)
-        assert_true(replay_firmware(firmware, &image));
-    else
-        load_image(IDROM_7I96S, &image);
-    const struct sim_card_options options = {.profile = firmware ? "7i93" : "7i96s", .image = &image};
-    struct sim_card *card = NULL;
-    struct hm2_diag diag = {0};
-    assert_int_equal(sim_card_new(&card, &options, &diag), 0);
+    struct sim_card *const card = firmware_card(firmware);
     edges->count = 0;
     if (!watched)
         return card;

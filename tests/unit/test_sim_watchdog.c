@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 #include "unit.h"
 
-#include "idrom_files.h"
+#include "firmware_card.h"
 #include "random.h"
 #include "sim_card.h"
 #include "trace_folder.h"
@@ -18,20 +18,6 @@ static void every_recorded_read_and_edge_is_matched(void **state)
     const struct replay_totals totals = replay_data("watchdog");
     assert_int_equal(totals.failed, 0);
     assert_int_equal(totals.passed, 12);
-}
-
-static struct sim_card *new_card(const char *const firmware)
-{
-    struct hm2_image image;
-    if (firmware)
-        assert_true(replay_firmware(firmware, &image));
-    else
-        load_image(IDROM_7I96S, &image);
-    const struct sim_card_options options = {.profile = firmware ? "7i93" : "7i96s", .image = &image};
-    struct sim_card *card = NULL;
-    struct hm2_diag diag = {0};
-    assert_int_equal(sim_card_new(&card, &options, &diag), 0);
-    return card;
 }
 
 /* ---- against the firmware's process, clock by clock ---------------------------------------------------------------
@@ -116,7 +102,7 @@ static void any_sequence_of_accesses_reads_as_in_the_firmware(void **state)
 {
     (void)state;
     for (unsigned seed = 0; seed < 3000; seed++) {
-        struct sim_card *const card = new_card("SVST4_4_48");
+        struct sim_card *const card = firmware_card("SVST4_4_48");
         play_random(card, (struct reference){.timer = 0x80000000}, seed);
         sim_card_free(card);
     }
@@ -128,11 +114,11 @@ static void any_sequence_of_accesses_reads_as_in_the_firmware(void **state)
 static void newer_firmware_has_not_bitten_at_power_up(void **state)
 {
     (void)state;
-    struct sim_card *card = new_card(NULL);
+    struct sim_card *card = firmware_card(NULL);
     assert_int_equal(sim_card_read(card, 10, STATUS, NULL), 0);
     assert_int_equal(sim_card_read(card, 10, TIME, NULL), 0x80000000);
     sim_card_free(card);
-    card = new_card("SVST4_4_48");
+    card = firmware_card("SVST4_4_48");
     assert_int_equal(sim_card_read(card, 10, STATUS, NULL), 1);
     sim_card_free(card);
 }
@@ -140,7 +126,7 @@ static void newer_firmware_has_not_bitten_at_power_up(void **state)
 static void a_bite_turns_off_open_drain_outputs_at_the_same_clock_as_the_others(void **state)
 {
     (void)state;
-    struct sim_card *const card = new_card("SVST4_4_48");
+    struct sim_card *const card = firmware_card("SVST4_4_48");
     sim_card_write(card, 10, DDR, 1);
     sim_card_write(card, 11, DRAIN, 2); /* data 0: pulled low whatever DDR says */
     sim_card_write(card, 12, TIME, 100);
@@ -156,7 +142,7 @@ static void a_bite_turns_off_open_drain_outputs_at_the_same_clock_as_the_others(
 static void switching_a_running_watchdog_off_is_a_bite(void **state)
 {
     (void)state;
-    struct sim_card *const card = new_card("SVST4_4_48");
+    struct sim_card *const card = firmware_card("SVST4_4_48");
     sim_card_write(card, 10, STATUS, 0);
     sim_card_write(card, 11, DDR, 0xFFFFFF);
     sim_card_write(card, 12, TIME, 1000);

@@ -2,8 +2,11 @@
 /* Simulated waveform generators. */
 #include "unit.h"
 
+#include "firmware_card.h"
 #include "sim_card.h"
 #include "trace_folder.h"
+
+#define FIRMWARE "SVWG8_2IM2_72"
 
 static void every_recorded_read_and_edge_is_matched(void **state)
 {
@@ -30,16 +33,6 @@ static void note_edge(void *context, int64_t clk, unsigned ps, unsigned watch, e
     p->rises++;
 }
 
-static struct sim_card *new_card(void)
-{
-    struct hm2_image image;
-    struct sim_card *card;
-    assert_true(replay_firmware("SVWG8_2IM2_72", &image));
-    const struct sim_card_options options = {.profile = "7i93", .image = &image};
-    assert_int_equal(sim_card_new(&card, &options, NULL), 0);
-    return card;
-}
-
 /* A quarter of the pulses, for the dividers of the recorded tests: the distances recorded there. */
 static void pulses_of_a_constant_value_have_the_recorded_distance(void **state)
 {
@@ -49,7 +42,7 @@ static void pulses_of_a_constant_value_have_the_recorded_distance(void **state)
         int64_t period;
     } rows[] = {{0x80, 4}, {0x00, 8}, {0x01, 12}, {0x7F, 4 * 129}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        struct sim_card *const card = new_card();
+        struct sim_card *const card = firmware_card(FIRMWARE);
         struct pulses p = {0};
         sim_card_write(card, 12, 0x2B00, rows[i].divider);
         sim_card_write(card, 18, 0x2D00, 0);
@@ -66,7 +59,7 @@ static void pulses_of_a_constant_value_have_the_recorded_distance(void **state)
 static void a_generator_at_rest_costs_nearly_nothing(void **state)
 {
     (void)state;
-    struct sim_card *const card = new_card();
+    struct sim_card *const card = firmware_card(FIRMWARE);
     uint32_t undriven = 0;
     sim_card_write(card, 12, 0x2B00, 0x7F);
     (void)sim_card_read(card, 360000000000, 0x2A00, &undriven);
