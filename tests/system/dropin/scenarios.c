@@ -771,9 +771,11 @@ static const struct event settings_events[] = {
 };
 
 static const char *const settings_keeps[] = {
-    "packet-*",                 /* the link's own */
-    "io_error",                 /* the same */
-    "rtt-reset",                /* the same */
+    "packet-read-timeout",      /* replies would come too late */
+    "packet-error-total",       /* the link's own */
+    "packet-error-decrement",   /* LinuxCNC's cannot be set */
+    "io_error",                 /* nothing else would be compared */
+    "rtt-reset",                /* LinuxCNC has none */
     "watchdog.timeout_ns",      /* it would bite */
     "encoder.sample-frequency", /* LinuxCNC's driver divides by it, and by what it becomes: that ends the process */
     "stepgen.??.step_type",     /* LinuxCNC's driver writes beyond its memory for long tables */
