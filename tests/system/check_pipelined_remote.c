@@ -98,7 +98,7 @@ static bool run(const struct host *const host, const char *const config)
     talk_do(&hal, "loadrt recorder pins=3 depth=%u file=%s/" PATH_FILE, ROWS, host->folder);
     talk_do(&hal, "loadrt threads name1=servo period1=20000000\naddf " CARD ".read servo\naddf recorder.sample servo\n"
                   "addf " CARD ".write servo");
-    talk_do(&hal, "setp " CARD ".packet-read-timeout 200000000\nsetp " CARD ".packet-error-limit 100000000");
+    talk_do(&hal, "setp " CARD ".packet-read-timeout 100000000\nsetp " CARD ".packet-error-limit 100000000");
     talk_do(&hal, "setp " CARD ".watchdog.timeout_ns 4000000000\nsetp " CARD ".sserial.port-0.fault-lim 100000\n"
                   "setp " CARD ".auto-rearm 1");
     talk_do(&hal, "setp " CARD ".7i77.0.0.watchdogtimeout 60000\nsetp " CARD ".7i77.0.1.watchdogtimeout 60000\n"
@@ -374,7 +374,7 @@ static void be_late(void)
     const double falls = pin("pipeline.falls"), late = pin("pipeline.late");
     await_active(1);
     const unsigned begun = said(BEGUN);
-    simulator_do(&sim, "faults delay=30000");
+    simulator_do(&sim, "faults delay=20000");
     await_active(0);
     simulator_do(&sim, "faults none");
     expect_said(BEGUN, begun + 1);
