@@ -278,7 +278,7 @@ uint64_t hm2_plan_requests(const struct hm2_plan *const plan)
 
 struct hm2_plan_tally hm2_plan_tally(const struct hm2_plan *const plan)
 {
-    const uint8_t *const trailer = plan->reply + plan->reply_len - PLAN_TRAILER_BYTES;
+    const uint8_t *const trailer = trailer_of(plan, plan->reply);
     const uint16_t came = hm2_get_le16(trailer + PLAN_TRAILER_RX_UDP),
                    answered = hm2_get_le16(trailer - PLAN_REPLIES_BYTES);
     return (struct hm2_plan_tally){

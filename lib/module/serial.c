@@ -255,14 +255,18 @@ static unsigned risen(const uint16_t now, const uint16_t before)
     return hm2_delta16(now, before) > 0 ? (unsigned)hm2_delta16(now, before) : 0;
 }
 
-/* The request before was answered. When the card has sent no other reply, no other request has come. */
+/* The request before was answered: a card that has not counted that tells nothing. When it has sent no other reply, no
+ * other request has come. */
 HM2_RARE static struct serial_passage compare(const struct hm2_plan_tally *const now,
                                               const struct hm2_plan_tally *const before)
 {
+    const uint16_t answered = (uint16_t)(now->answered - before->answered);
+    if (answered == 0)
+        return (struct serial_passage){0};
     return (struct serial_passage){.told = true,
                                    .twice = risen(now->requests, before->requests),
                                    .writes_twice = risen(now->writes, before->writes),
-                                   .unheard = (uint16_t)(now->answered - before->answered) <= 1u};
+                                   .unheard = answered == 1u};
 }
 
 static inline void look_back(struct ports *const ports, const struct hm2_plan *const plan)

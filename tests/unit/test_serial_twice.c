@@ -352,6 +352,24 @@ static void a_part_of_a_frame_that_comes_twice_spoils_no_other_frame(void **stat
     }
 }
 
+/* At 9600 baud two periods bring less than three bytes. */
+static void no_more_is_uncertain_than_the_line_can_have_brought(void **state)
+{
+    const struct row *const slow = &rows[1];
+    (void)state;
+    for (unsigned pipelined = 0; pipelined < 2; pipelined++) {
+        struct line l = open_line(slow, (struct weather){.fault = LOST, .replies = true}, pipelined);
+        receive_all(&l);
+        const struct hm2_serial_counts counts = hm2_serial_counts(l.port);
+        const uint64_t lost = sim_net_truth(l.bench->net).lost[1];
+        assert_true(slow->baud == 9600 && lost > 2);
+        missing_is_counted(&l, &counts);
+        if (counts.rx_uncertain > 3u * lost)
+            fail_with(&l, &counts);
+        close_line(&l);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -361,6 +379,7 @@ int main(void)
         cmocka_unit_test(what_a_turn_that_comes_twice_sends_again_is_counted),
         cmocka_unit_test(a_part_of_a_frame_that_comes_twice_spoils_no_other_frame),
         cmocka_unit_test(what_a_request_or_reply_that_is_overtaken_takes_along_is_counted),
+        cmocka_unit_test(no_more_is_uncertain_than_the_line_can_have_brought),
         cmocka_unit_test(replies_that_come_twice_cost_nothing),
         cmocka_unit_test(a_write_that_is_carried_out_twice_takes_nothing_and_a_request_sends_nothing),
         cmocka_unit_test(a_stranger_costs_nothing),
