@@ -501,7 +501,6 @@ END_TEST
 
 START_TEST(a_connection_that_takes_longer_is_tried_anew)
 {
-    response_ms = 100;
     write_file("busy.ini", "VERSION=1.1\nTOTAL_TRANSACTIONS=1\n", tcp_link(),
                "MB_TX_CODE=fnct_03_read_holding_registers\nFIRST_ELEMENT=1\nNELEMENTS=1\n");
     make_busy_device();
