@@ -14,7 +14,6 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <termios.h>
 #include <time.h>
@@ -22,6 +21,7 @@
 
 #include <modbus/modbus.h>
 
+#include "folder.h"
 #include "mb2hal_peer.h"
 #include "suite.h"
 #include "talk.h"
@@ -46,7 +46,7 @@ struct device {
 
 static struct device *device;
 static pid_t server;
-static char address[16], folder[64], terminal[64];
+static char address[16], folder[FOLDER_PATH], terminal[64];
 static int master = -1, response_ms;
 static struct talk hal;
 
@@ -189,19 +189,15 @@ static void set_up(void)
     }
     device->coils[3] = 1;
     test_address(0, address);
-    snprintf(folder, sizeof folder, "/tmp/check-modbus-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    ck_assert_int_eq(chmod(folder, 0755), 0);
+    folder_make(folder, "modbus");
     master = -1;
     response_ms = 300;
 }
 
 static void tear_down(void)
 {
-    const char *const argv[] = {"rm", "-r", folder, NULL};
-    static struct process remove;
     stop_server();
-    process_run(&remove, argv, LIMIT_MS);
+    folder_remove(folder);
     munmap(device, sizeof *device);
 }
 
