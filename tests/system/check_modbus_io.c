@@ -23,6 +23,7 @@
 
 #include "folder.h"
 #include "mb2hal_peer.h"
+#include "shared_memory.h"
 #include "suite.h"
 #include "talk.h"
 
@@ -180,8 +181,7 @@ static void write_file(const char *const name, const char *const head, const cha
 
 static void set_up(void)
 {
-    device = mmap(NULL, sizeof *device, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    ck_assert_ptr_ne(device, MAP_FAILED);
+    device = shared_memory(sizeof *device);
     for (unsigned i = 0; i < TABLE; i++) {
         device->inputs[i] = i % 3 == 0;
         device->holding[i] = (uint16_t)(1000 + i);
