@@ -47,7 +47,7 @@ struct device {
 
 static struct device *device;
 static pid_t server;
-static char address[16], folder[FOLDER_PATH], terminal[64];
+static char address[16], folder[64], terminal[64];
 static int master = -1, response_ms;
 static struct talk hal;
 
