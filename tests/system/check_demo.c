@@ -13,6 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "folder.h"
 #include "process.h"
 #include "suite.h"
 
@@ -243,7 +244,7 @@ END_TEST
 
 #define ROWS 101
 
-static char folder[64];
+static char folder[FOLDER_PATH];
 
 struct rows {
     double cmd[ROWS][3], fb[ROWS][3];
@@ -305,8 +306,7 @@ static int run_report(void)
 static void make_good_folder(void)
 {
     static struct rows rows;
-    snprintf(folder, sizeof folder, "/tmp/check_demo.XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
+    folder_make(folder, "demo");
     good_rows(&rows);
     write_run(&rows, "");
     write_text("cycle.csv", "thread,what,from_ns,to_ns,count\nservo,busy,100000,110000,101\n"
@@ -317,8 +317,7 @@ static void make_good_folder(void)
 
 static void remove_folder(void)
 {
-    const char *const argv[] = {"rm", "-rf", folder, NULL};
-    process_run(&report, argv, END_MS);
+    folder_remove(folder);
 }
 
 START_TEST(a_good_run_is_reported_and_drawn)

@@ -11,12 +11,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "dropin/scenario.h"
 #include "dropin_table.h"
+#include "shared_memory.h"
 #include "suite.h"
 
 #define MAX_POINTS 1000u
@@ -42,14 +42,6 @@ struct record {
 static struct record *theirs, *ours;
 static unsigned *compared; /* scenarios, by all forked tests together */
 static char where[64];
-
-static void *shared_memory(const size_t size)
-{
-    void *const memory = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-    if (memory == MAP_FAILED)
-        ck_abort_msg("no memory: %s", strerror(errno));
-    return memory;
-}
 
 /* ---- running ------------------------------------------------------------------------------------------------------
  */

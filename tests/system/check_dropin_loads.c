@@ -10,13 +10,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "dropin/driver.h"
 #include "dropin_table.h"
 #include "process.h"
+#include "shared_memory.h"
 #include "suite.h"
 
 #define MAX_POINTS 800u
@@ -332,14 +332,6 @@ START_TEST(a_module_parameter_is_used_or_told_to_have_no_effect)
         ck_assert_msg(!strstr(ours->messages, name), "%s: %s", parameter, ours->messages);
 }
 END_TEST
-
-static void *shared_memory(const size_t size)
-{
-    void *const memory = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    if (memory == MAP_FAILED)
-        exit(1);
-    return memory;
-}
 
 int main(void)
 {

@@ -12,13 +12,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "dropin_table.h"
 #include "linuxcnc_peer.h"
 #include "process.h"
+#include "shared_memory.h"
 #include "suite.h"
 
 #define PEER_LIMIT_MS 300000 /* for all tries that linuxcnc-peer makes */
@@ -352,9 +352,7 @@ int main(void)
 {
     dropin_table_load(TEST_DATA "/dropin/differences");
     dropin_table_load(TEST_DATA "/dropin/modules");
-    shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    if (shared == MAP_FAILED)
-        return 1;
+    shared = shared_memory(sizeof *shared);
     Suite *const suite = suite_create("dropin names");
     TCase *const tests = tcase_create("names");
     tcase_set_timeout(tests, PEER_LIMIT_MS / 1000.0 + 60.0);

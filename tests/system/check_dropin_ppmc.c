@@ -16,7 +16,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/io.h>
-#include <sys/mman.h>
 #include <sys/wait.h>
 #include <ucontext.h>
 #include <unistd.h>
@@ -25,6 +24,7 @@
 
 #include "halhost.h"
 #include "process.h"
+#include "shared_memory.h"
 #include "state.h"
 #include "suite.h"
 
@@ -366,11 +366,8 @@ END_TEST
 
 int main(void)
 {
-    const size_t size = sizeof(struct record);
-    theirs = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    ours = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    if (theirs == MAP_FAILED || ours == MAP_FAILED)
-        return 1;
+    theirs = shared_memory(sizeof *theirs);
+    ours = shared_memory(sizeof *ours);
     Suite *const suite = suite_create("dropin ppmc");
     TCase *const tests = tcase_create("ppmc");
     tcase_set_timeout(tests, 60);

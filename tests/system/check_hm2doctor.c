@@ -2,11 +2,11 @@
 /* hm2doctor on states of computers that were kept, on round trips of known patterns, and on a simulated card. */
 #include <check.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "folder.h"
 #include "simulator.h"
 #include "suite.h"
 
@@ -17,7 +17,7 @@
 #define CANNOT_RUN 77
 
 static struct process run;
-static char folder[] = "/tmp/check-doctor-XXXXXX";
+static char folder[FOLDER_PATH];
 
 static int doctor(const char *const *options)
 {
@@ -254,13 +254,12 @@ END_TEST
 
 static void make_folder(void)
 {
-    ck_assert_ptr_nonnull(mkdtemp(folder));
+    folder_make(folder, "doctor");
 }
 
 static void remove_folder(void)
 {
-    const char *const argv[] = {"rm", "-rf", folder, NULL};
-    ck_assert_int_eq(process_run(&run, argv, RUN_MS), 0);
+    folder_remove(folder);
 }
 
 int main(void)

@@ -13,12 +13,12 @@
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <linux/capability.h>
 
+#include "folder.h"
 #include "process.h"
 #include "suite.h"
 
@@ -31,22 +31,18 @@
 #define SKIPPED  77
 
 static struct process host, peer;
-static char folder[64];
+static char folder[FOLDER_PATH];
 
 /* ---- files and runs --------------------------------------------------------------------------------------------- */
 
 static void make_folder(void)
 {
-    snprintf(folder, sizeof folder, "/tmp/check_hm2host.XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    ck_assert_int_eq(chmod(folder, 0755), 0);
+    folder_make(folder, "hm2host");
 }
 
 static void remove_folder(void)
 {
-    static struct process rm;
-    const char *const argv[] = {"rm", "-rf", folder, NULL};
-    process_run(&rm, argv, END_MS);
+    folder_remove(folder);
 }
 
 /* Path of a file in the test's folder; the last four stay valid. */

@@ -2,10 +2,10 @@
 /* hm2replay as a program: what it prints and how it exits. */
 #include <check.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
+#include "folder.h"
 #include "process.h"
 #include "replay_trace.h"
 #include "suite.h"
@@ -13,7 +13,7 @@
 #define END_MS 60000
 
 static struct process replay;
-static char folder[64];
+static char folder[FOLDER_PATH];
 
 static int run(const char *const a, const char *const b, const char *const c)
 {
@@ -33,15 +33,12 @@ static void printed(const char *const text)
 
 static void make_folder(void)
 {
-    snprintf(folder, sizeof folder, "/tmp/check_hm2replay.XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
+    folder_make(folder, "hm2replay");
 }
 
 static void remove_folder(void)
 {
-    static struct process rm;
-    const char *const argv[] = {"rm", "-rf", folder, NULL};
-    process_run(&rm, argv, END_MS);
+    folder_remove(folder);
 }
 
 /* A trace folder of this kind with one test. */

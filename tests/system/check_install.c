@@ -10,13 +10,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "folder.h"
 #include "process.h"
 #include "suite.h"
 
 #define BUILD_MS 600000
 #define USE_MS   60000
 
-static char folder[64]; /* with: src the unpacked archive, out the build, usr the installation, work for the tests */
+/* With: src the unpacked archive, out the build, usr the installation, work for the tests. */
+static char folder[FOLDER_PATH];
 static struct process shell;
 
 /* Run a script in the folder. */
@@ -39,8 +41,7 @@ static void run(const char *const script, const int limit_ms)
 /* Once, before the tests: build from the archive, install, and throw sources and build away. */
 static void install_from_archive(void)
 {
-    snprintf(folder, sizeof folder, "/tmp/check-install-%d", (int)getpid());
-    ck_assert_int_eq(mkdir(folder, 0755), 0);
+    folder_make(folder, "install");
     run("mkdir src out work\n"
         "if git -C '" TEST_SOURCE "' rev-parse 2>/dev/null; then\n"
         "    command make -s -C '" TEST_SOURCE "' dist BUILDDIR=$here/out\n"
@@ -59,8 +60,7 @@ static void install_from_archive(void)
 
 static void remove_folder(void)
 {
-    const char *const argv[] = {"rm", "-rf", folder, NULL};
-    (void)process_run(&shell, argv, USE_MS);
+    folder_remove(folder);
 }
 
 /* Nothing may come from the sources or the build any more. */

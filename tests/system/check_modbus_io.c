@@ -16,7 +16,6 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <termios.h>
 #include <time.h>
@@ -24,7 +23,9 @@
 
 #include <modbus/modbus.h>
 
+#include "folder.h"
 #include "mb2hal_peer.h"
+#include "shared_memory.h"
 #include "suite.h"
 #include "talk.h"
 
@@ -183,8 +184,7 @@ static void write_file(const char *const name, const char *const head, const cha
 
 static void set_up(void)
 {
-    device = mmap(NULL, sizeof *device, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    ck_assert_ptr_ne(device, MAP_FAILED);
+    device = shared_memory(sizeof *device);
     for (unsigned i = 0; i < TABLE; i++) {
         device->inputs[i] = i % 3 == 0;
         device->holding[i] = (uint16_t)(1000 + i);
@@ -192,19 +192,15 @@ static void set_up(void)
     }
     device->coils[3] = 1;
     test_address(0, address);
-    snprintf(folder, sizeof folder, "/tmp/check-modbus-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    ck_assert_int_eq(chmod(folder, 0755), 0);
+    folder_make(folder, "modbus");
     master = -1;
     response_ms = 300;
 }
 
 static void tear_down(void)
 {
-    const char *const argv[] = {"rm", "-r", folder, NULL};
-    static struct process remove;
     stop_server();
-    process_run(&remove, argv, LIMIT_MS);
+    folder_remove(folder);
     munmap(device, sizeof *device);
 }
 

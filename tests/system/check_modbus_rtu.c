@@ -8,9 +8,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "folder.h"
 #include "mb2hal_peer.h"
 #include "serial_pair.h"
 #include "suite.h"
@@ -22,25 +22,21 @@
 static struct serial_pair pair;
 static struct process pymodbus;
 static struct talk hal;
-static char folder[64], config[128];
+static char folder[FOLDER_PATH], config[128];
 
 static void set_up(void)
 {
-    snprintf(folder, sizeof folder, "/tmp/check-modbus-rtu-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    ck_assert_int_eq(chmod(folder, 0755), 0);
+    folder_make(folder, "modbus-rtu");
     snprintf(config, sizeof config, "%s/map.ini", folder);
     serial_pair_open(&pair);
 }
 
 static void tear_down(void)
 {
-    static struct process remove;
-    const char *const argv[] = {"rm", "-r", folder, NULL};
     if (pymodbus.pid)
         (void)process_stop(&pymodbus, SIGKILL, LIMIT_MS);
     serial_pair_close(&pair);
-    (void)process_run(&remove, argv, LIMIT_MS);
+    folder_remove(folder);
 }
 
 /* False when there is no pymodbus. */

@@ -19,6 +19,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "folder.h"
 #include "process.h"
 #include "suite.h"
 
@@ -31,7 +32,7 @@
 #define STEP       (1.0 / 200.0) /* the example's position-scale is 200 */
 
 static struct process card, host, builder;
-static char folder[64];
+static char folder[FOLDER_PATH];
 
 /* ---- blocks of the text ----------------------------------------------------------------------------------------- */
 
@@ -94,8 +95,7 @@ static void make_folder(void)
 {
     char path[128];
     read_blocks();
-    snprintf(folder, sizeof folder, "/tmp/check_readme.XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
+    folder_make(folder, "readme");
     snprintf(path, sizeof path, "%s/build", folder);
     ck_assert_int_eq(symlink(TEST_BUILD, path), 0);
     ck_assert_int_eq(chdir(folder), 0);
@@ -103,9 +103,8 @@ static void make_folder(void)
 
 static void remove_folder(void)
 {
-    const char *const argv[] = {"rm", "-rf", folder, NULL};
     ck_assert_int_eq(chdir("/"), 0);
-    process_run(&host, argv, END_MS);
+    folder_remove(folder);
 }
 
 static int set_address(const int fd, const char *const name, const char *const address)

@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "folder.h"
 #include "serial_pair.h"
 #include "simulator.h"
 #include "suite.h"
@@ -23,13 +24,12 @@
 static struct simulator sim;
 static struct process drive;
 static struct talk hal;
-static char folder[64], terminal[80];
+static char folder[FOLDER_PATH], terminal[80];
 
 static void set_up(void)
 {
     char uart[128];
-    snprintf(folder, sizeof folder, "/tmp/check-vfd-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
+    folder_make(folder, "vfd");
     ck_assert_int_eq(chdir(folder), 0);
     ck_assert_int_eq(symlink(TEST_SOURCE "/examples", "examples"), 0);
     snprintf(terminal, sizeof terminal, "%s/vfd", folder);
@@ -41,12 +41,10 @@ static void set_up(void)
 
 static void tear_down(void)
 {
-    static struct process remove;
-    const char *const argv[] = {"rm", "-r", folder, NULL};
     if (drive.pid)
         (void)process_stop(&drive, SIGKILL, LIMIT_MS);
     simulator_stop(&sim);
-    (void)process_run(&remove, argv, LIMIT_MS);
+    folder_remove(folder);
 }
 
 /* False when there is no pymodbus. */
@@ -126,7 +124,6 @@ START_TEST(linuxcncs_driver_runs_the_simulated_drive_to_its_speed)
     const char *const argv[] = {TEST_SOURCE "/tests/system/halrun-user", "peer.hal", NULL};
     serial_pair_open(&pair);
     snprintf(terminal, sizeof terminal, "%s", pair.device);
-    ck_assert_int_eq(chmod(folder, 0755), 0);
     write_text("wait", 0755,
                "#!/bin/sh\nuntil [ \"$(halcmd getp wj200-vfd.0.is-at-speed)\" = TRUE ]; do sleep 0.1; done\n");
     write_text("peer.hal", 0644,

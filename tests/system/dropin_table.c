@@ -6,7 +6,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
+
+#include "shared_memory.h"
 
 #define MAX_ROWS 512u
 
@@ -41,9 +42,7 @@ void dropin_table_load(const char *const path)
 {
     char line[512];
     if (!table)
-        table = mmap(NULL, sizeof *table, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    if (table == MAP_FAILED)
-        give_up(path, 0, strerror(errno));
+        table = shared_memory(sizeof *table);
     FILE *const file = fopen(path, "r");
     if (!file) {
         give_up(path, 0, strerror(errno));

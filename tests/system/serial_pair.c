@@ -16,6 +16,8 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include "shared_memory.h"
+
 #define FRAME_BYTES 512
 #define QUIET_MS    5  /* a frame ends */
 #define LOOK_MS     10 /* between looks at the fault */
@@ -123,8 +125,7 @@ void serial_pair_open(struct serial_pair *const pair)
 {
     open_end(pair->client, &pair->fds[0], &pair->fds[1]);
     open_end(pair->device, &pair->fds[2], &pair->fds[3]);
-    pair->wire = mmap(NULL, sizeof *pair->wire, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    ck_assert_ptr_ne(pair->wire, MAP_FAILED);
+    pair->wire = shared_memory(sizeof *pair->wire);
     (void)fflush(NULL);
     pair->process = fork();
     ck_assert_int_ge(pair->process, 0);
