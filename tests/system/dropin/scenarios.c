@@ -762,6 +762,13 @@ static const struct setting settings_settings[] = {
     {0, "watchdog.timeout_ns", 100000000},
 };
 
+/* No numbers, after the last draw. */
+static const struct setting no_numbers_settings[] = {
+    {0, "watchdog.timeout_ns", 100000000}, {2500, "pwmgen.00.enable", 1},         {2500, "pwmgen.00.value", NAN},
+    {2500, "encoder.00.scale", NAN},       {2500, "encoder.00.vel-timeout", NAN}, {2500, "dpll.01.timer-us", NAN},
+    {2500, "dpll.02.timer-us", INFINITY},  {2500, "dpll.03.timer-us", -INFINITY},
+};
+
 static const struct wave settings_waves[] = {
     {"led.CR01", WAVE_SQUARE, 0.5, 0.5, 100, 0, 2560},
 };
@@ -769,6 +776,9 @@ static const struct wave settings_waves[] = {
 static const struct event settings_events[] = {
     {1, 0, PAD, 3, SIM_LOW, 0, 0},
 };
+
+#define no_numbers_waves  settings_waves
+#define no_numbers_events settings_events
 
 static const char *const settings_keeps[] = {
     "packet-read-timeout",      /* replies would come too late */
@@ -872,7 +882,7 @@ const struct scenario scenarios[] = {
              .reached = {{"resolver.01.error", 1}, {"resolver.00.velocity", 5}, {"resolver.05.position", 1}}),
     SCENARIO(servo, "7i93", "num_encoders=8 num_pwmgens=8 num_stepgens=4", 1500,
              .reached = {{"encoder.03.count", 500}, {"encoder.06.count", 500}, {"stepgen.00.counts", 1000}}),
-    SCENARIO(settings, "7i96s", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
+    NAMED_SCENARIO("settings", no_numbers, "7i96s", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
     SCENARIO(settings, "7i93", "enable_raw", 2560, .settle = 64, .keeps = settings_keeps),
     SCENARIO(settings, "7i93", "", 2560, .settle = 64, .keeps = settings_keeps,
              .firmware = TEST_DATA "/firmware/latch_48.hex"),
