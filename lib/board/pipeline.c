@@ -97,6 +97,11 @@ static bool may_run(struct hm2_board *const board, const int64_t now_ns)
     return room && time;
 }
 
+HM2_RARE static void align(struct hm2_board *const board)
+{
+    hm2_dpll_align(hm2_board_module(board, HM2_GTAG_DPLL));
+}
+
 HM2_RARE static void begin(struct hm2_board *const board, const int64_t now_ns)
 {
     struct board_pipeline *const p = &board->pipeline;
@@ -104,14 +109,26 @@ HM2_RARE static void begin(struct hm2_board *const board, const int64_t now_ns)
     p->level = 0;
     p->started_ns = now_ns;
     *p->points->active = true;
-    hm2_dpll_align(hm2_board_module(board, HM2_GTAG_DPLL));
+    p->settled = false;
+    align(board);
     tell(board, BOARD_EVENT_PIPELINE_RUNS);
+}
+
+/* The first turn came behind a read that waited for its reply, all others come sooner: the loop is aligned once more.
+ */
+HM2_RARE static void settle(struct hm2_board *const board)
+{
+    align(board);
+    board->pipeline.settled = true;
 }
 
 static void note_work(struct hm2_board *const board, const int64_t now_ns)
 {
     struct board_pipeline *const p = &board->pipeline;
-    const int64_t work_ns = now_ns - board->read_ns;
+    /* Waiting for a reply is no work, and without a reply nobody knows how much of the time was. */
+    if (board->received_ns == 0)
+        return;
+    const int64_t work_ns = now_ns - board->received_ns;
     const int64_t before_ns = p->work_ns - p->work_ns / WORK_FORGETS;
     p->work_ns = work_ns > before_ns ? work_ns : before_ns;
 }
@@ -129,6 +146,8 @@ bool board_pipeline_turns(struct hm2_board *const board, const int64_t now_ns)
         fall_back(board, now_ns);
     else if (!p->runs && may_run(board, now_ns))
         begin(board, now_ns);
+    else if (p->runs && !p->settled)
+        settle(board);
     return p->runs;
 }
 

@@ -22,9 +22,10 @@ struct board_pipeline_points {
 struct board_pipeline {
     unsigned timer; /* 0 = not asked for: nothing else is used */
     bool runs;
+    bool settled;           /* the second turn since then was sent */
     bool turned;            /* the last request was a turn */
     unsigned level;         /* rises with late and lost replies, falls with good ones */
-    int64_t work_ns;        /* from the beginning of read to the write, with its peaks */
+    int64_t work_ns;        /* from the reply to the write, with its peaks */
     int64_t need_ns;        /* between a write and the reads, for what writes start */
     int64_t timeout_ns;     /* how long the card waits at most */
     int64_t rtt_ns;         /* that nearly all replies need without waiting */

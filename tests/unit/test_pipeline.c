@@ -48,6 +48,23 @@ static void a_read_waits_for_nothing_and_a_cycle_is_one_datagram_each_way(void *
     assert_in_range((unsigned)servo_get(f, "pipeline.margin-us"), 500, 850);
 }
 
+/* The write of the cycle in which turns begin comes later than those after it, by the round trip that its read waits.
+ */
+static void turns_find_the_timer_in_its_place_from_the_beginning(void **state)
+{
+    struct servo_rig *const f = *state;
+    servo_faults(f, &(struct sim_faults){.seed = 1, .delay_min_ns = 120000, .delay_max_ns = 120000});
+    servo_load(f, PIPELINED);
+    for (unsigned i = 0; i < 1000 && servo_get(f, "pipeline.active") == 0; i++)
+        servo_cycle(f);
+    servo_cycles(f, 3);
+    for (unsigned i = 0; i < 400; i++) {
+        servo_cycle(f);
+        assert_in_range((unsigned)servo_get(f, "pipeline.wait-us"), 50, 110);
+    }
+    assert_true(servo_get(f, "pipeline.active") == 1);
+}
+
 static void without_the_key_nothing_changes(void **state)
 {
     struct servo_rig *const f = *state;
@@ -70,7 +87,7 @@ static void without_room_it_stays_plain_and_says_why(void **state)
 {
     struct servo_rig *const f = *state;
     servo_load(f, PIPELINED);
-    f->work_ns = 750000;
+    f->work_ns = 900000;
     servo_cycles(f, 1000);
     assert_true(servo_get(f, "pipeline.active") == 0);
     assert_true(servo_message(f, "has no room"));
@@ -359,6 +376,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(it_starts_by_itself_and_says_so),
         TEST(a_read_waits_for_nothing_and_a_cycle_is_one_datagram_each_way),
+        TEST(turns_find_the_timer_in_its_place_from_the_beginning),
         TEST(without_the_key_nothing_changes),
         TEST(it_is_refused_without_a_dpll),
         TEST(without_room_it_stays_plain_and_says_why),
