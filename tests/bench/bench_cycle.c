@@ -6,6 +6,8 @@
  *     bench_cycle count DRIVER PREFIX CYCLES FOLDER [component arguments...]
  *     bench_cycle misses DRIVER PREFIX CYCLES FOLDER [component arguments...]
  *     bench_cycle echo  ADDRESS PORT REQUEST_BYTES REPLY_BYTES WRITE_BYTES CYCLES
+ *     bench_cycle same  ADDRESS PORT REQUEST_BYTES REPLY_BYTES WRITE_BYTES CYCLES INTERFACE
+ *                       DRIVER PREFIX FOLDER [component arguments...]
  *     bench_cycle serve ADDRESS PORT REQUEST_BYTES REPLY_BYTES
  *
  * DRIVER is hm2_lbp16, or hm2_eth (LinuxCNC's, with hostmot2 before it). PREFIX names the first card, "hm2_7i93.0", or
@@ -13,9 +15,16 @@
  * is loaded into the small HAL host in this process; a 1 kHz thread calls PREFIX.read and PREFIX.write with marks of
  * our own around them. Instructions are counted by single-stepping that thread from another process: exact, and without
  * the kernel's share. `misses` counts the cycles that failed, with the driver's own deadline. `echo` exchanges packets
- * of the same sizes with `serve`, with nothing but the system calls.
+ * of the same sizes with `serve`, with nothing but the system calls; `same` exchanges the very packets of a cycle of
+ * the driver with the card, so that the card's work is the same.
  */
+#include <arpa/inet.h>
 #include <errno.h>
+#include <linux/if_packet.h>
+#include <net/ethernet.h>
+#include <net/if.h>
+#include <netinet/ip.h>
+#include <netinet/udp.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdbool.h>
@@ -418,37 +427,38 @@ static int serve(char **const argv)
     }
 }
 
-static int64_t exchange(const int fd, const char *const data, const size_t request, const size_t reply)
+struct packet {
+    size_t len;
+    char bytes[1500];
+};
+
+static int64_t exchange(const int fd, const struct packet *const request, const size_t reply)
 {
     char buffer[2048];
     struct pollfd ready = {.fd = fd, .events = POLLIN};
     const struct timespec limit = {.tv_nsec = 100000000};
     const int64_t start = now_ns();
-    if (send(fd, data, request, 0) < 0 || ppoll(&ready, 1, &limit, NULL) != 1 ||
+    if (send(fd, request->bytes, request->len, 0) < 0 || ppoll(&ready, 1, &limit, NULL) != 1 ||
         recv(fd, buffer, sizeof buffer, MSG_DONTWAIT) != (ssize_t)reply)
         fprintf(stderr, "bench_cycle: an echo was lost\n");
     return now_ns() - start;
 }
 
-static int echo(char **const argv)
+static int measure_exchanges(const struct sockaddr_in *const peer, const struct packet *const request,
+                             const size_t reply, const struct packet *const write, const int cycles)
 {
-    const struct sockaddr_in peer = address_of(argv[0], argv[1]);
-    const size_t request = strtoul(argv[2], NULL, 10), reply = strtoul(argv[3], NULL, 10),
-                 write_bytes = strtoul(argv[4], NULL, 10);
-    const int cycles = (int)strtoul(argv[5], NULL, 10);
     const int fd = socket(AF_INET, SOCK_DGRAM, 0);
-    static const char data[2048];
     int64_t *const reads = calloc((size_t)cycles, sizeof *reads);
     int64_t *const writes = calloc((size_t)cycles, sizeof *writes);
-    if (!reads || !writes || fd < 0 || connect(fd, (const struct sockaddr *)&peer, sizeof peer) != 0)
+    if (!reads || !writes || fd < 0 || connect(fd, (const struct sockaddr *)peer, sizeof *peer) != 0)
         exit(1);
     take_processor(CLIENT_CPU);
     int64_t next = now_ns();
     for (int i = -WARM_UP; i < cycles; i++) {
         sleep_until(next += PERIOD_NS);
-        const int64_t read_ns = exchange(fd, data, request, reply);
+        const int64_t read_ns = exchange(fd, request, reply);
         const int64_t start = now_ns();
-        if (send(fd, data, write_bytes, 0) < 0)
+        if (send(fd, write->bytes, write->len, 0) < 0)
             exit(1);
         if (i >= 0) {
             reads[i] = read_ns;
@@ -462,6 +472,67 @@ static int echo(char **const argv)
     return 0;
 }
 
+/* Packets without contents, or with those of a driver. */
+static int echo(char **const argv, const struct packet *const request, const struct packet *const write)
+{
+    const struct sockaddr_in peer = address_of(argv[0], argv[1]);
+    return measure_exchanges(&peer, request, strtoul(argv[3], NULL, 10), write, (int)strtol(argv[5], NULL, 10));
+}
+
+/* ---- what a driver sends ----------------------------------------------------------------------------------------- */
+
+static int open_tap(const char *const interface)
+{
+    const struct sockaddr_ll all = {
+        .sll_family = AF_PACKET, .sll_protocol = htons(ETH_P_ALL), .sll_ifindex = (int)if_nametoindex(interface)};
+    const int tap = socket(AF_PACKET, SOCK_DGRAM, htons(ETH_P_ALL));
+    if (tap < 0 || bind(tap, (const struct sockaddr *)&all, sizeof all) != 0) {
+        perror("bench_cycle: capture");
+        exit(1);
+    }
+    return tap;
+}
+
+/* The next datagram to a card that has the wanted length. */
+static void capture(const int tap, struct packet *const wanted)
+{
+    for (;;) {
+        char bytes[2048];
+        struct sockaddr_ll from = {.sll_pkttype = PACKET_HOST};
+        socklen_t len = sizeof from;
+        const ssize_t got = recvfrom(tap, bytes, sizeof bytes, 0, (struct sockaddr *)&from, &len);
+        const size_t headers = sizeof(struct iphdr) + sizeof(struct udphdr);
+        if (got < 0)
+            exit(1);
+        if (from.sll_pkttype != PACKET_OUTGOING || (size_t)got != headers + wanted->len ||
+            ((const struct iphdr *)(const void *)bytes)->protocol != IPPROTO_UDP)
+            continue;
+        memcpy(wanted->bytes, bytes + headers, wanted->len);
+        return;
+    }
+}
+
+/* Let the driver run, and take the packets of one of its cycles. */
+static void capture_cycle(const char *const interface, struct packet *const request, struct packet *const write,
+                          char **const argv, const int count)
+{
+    const pid_t child = fork();
+    if (child == 0) {
+        wanted_cycles = 0;
+        start_driver(argv[0], argv[1], argv[2], argv + 3, count - 3);
+        for (;;)
+            pause();
+    }
+    while (shared->cycle < WARM_UP && waitpid(child, NULL, WNOHANG) == 0)
+        usleep(1000);
+    const int tap = open_tap(interface);
+    capture(tap, request);
+    capture(tap, write);
+    (void)close(tap);
+    kill(child, SIGKILL);
+    (void)waitpid(child, NULL, 0);
+}
+
 int main(const int argc, char **const argv)
 {
     shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -473,8 +544,14 @@ int main(const int argc, char **const argv)
         return count_misses((int)strtol(argv[4], NULL, 10), argv + 2, argc - 2);
     if (argc >= 6 && strcmp(argv[1], "count") == 0)
         return measure_instructions((int)strtol(argv[4], NULL, 10), argv + 2, argc - 2);
-    if (argc == 8 && strcmp(argv[1], "echo") == 0)
-        return echo(argv + 2);
+    if (argc >= 8 && (strcmp(argv[1], "echo") == 0 || strcmp(argv[1], "same") == 0)) {
+        struct packet request = {.len = strtoul(argv[4], NULL, 10)}, write = {.len = strtoul(argv[6], NULL, 10)};
+        if (request.len > sizeof request.bytes || write.len > sizeof write.bytes)
+            return 2;
+        if (strcmp(argv[1], "same") == 0 && argc >= 12)
+            capture_cycle(argv[8], &request, &write, argv + 9, argc - 9);
+        return echo(argv + 2, &request, &write);
+    }
     if (argc == 6 && strcmp(argv[1], "serve") == 0)
         return serve(argv + 2);
     fprintf(stderr, "bench_cycle: see the comment at the top of bench_cycle.c, or run `make bench`\n");
