@@ -32,15 +32,14 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <sys/ptrace.h>
 #include <sys/socket.h>
-#include <sys/user.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "halhost.h"
 #include "session.h"
 #include "state.h"
+#include "steps.h"
 #include "table.h"
 #include "timing.h"
 
@@ -88,7 +87,7 @@ struct shared {
     _Atomic int thread;      /* kernel's number of the realtime thread */
     _Atomic int cycle;       /* complete ones */
     _Atomic unsigned errors; /* the driver's packet-error-total */
-    uintptr_t read, write;   /* where the driver's functions begin */
+    struct step_code code;   /* of the driver */
 };
 
 static struct shared *shared;
@@ -278,8 +277,7 @@ static void start_driver(const char *const name, const char *const text, const c
     load(name, arguments, count);
     for (unsigned i = 0; i < cards; i++)
         put_to_work(prefixes[i], i);
-    shared->read = code_of(prefix, ".read");
-    shared->write = code_of(prefix, ".write");
+    shared->code = (struct step_code){.read = code_of(prefix, ".read"), .write = code_of(prefix, ".write")};
     add("mark", ".begin");
     add_all(prefixes, ".read");
     add("mark", ".middle");
@@ -335,55 +333,9 @@ static int count_misses(const int cycles, char **const argv, const int count)
 
 /* ---- instructions ------------------------------------------------------------------------------------------------ */
 
-struct counts {
-    long long read, write;
-    int cycles;
-};
-
-/* Step the stopped thread through whole cycles. What is executed from the first instruction of a function of the
- * driver's until its return is the driver's; system calls are one instruction. */
-static int step_cycles(const pid_t thread, const int cycles, struct counts *const counts)
-{
-    struct user_regs_struct regs;
-    long long *inside = NULL;
-    unsigned long stack = 0;
-    int status, signal = 0;
-
-    while (counts->cycles < cycles) {
-        if (ptrace(PTRACE_SINGLESTEP, thread, NULL, signal) != 0 || waitpid(thread, &status, __WALL) != thread)
-            return -1;
-        if (!WIFSTOPPED(status)) {
-            fprintf(stderr, "bench_cycle: the driver ended with status 0x%X after %d cycles\n", (unsigned)status,
-                    counts->cycles);
-            return -1;
-        }
-        signal = WSTOPSIG(status) == SIGTRAP ? 0 : WSTOPSIG(status);
-        if (ptrace(PTRACE_GETREGS, thread, NULL, &regs) != 0)
-            return -1;
-        if (inside && regs.rsp > stack) {
-            counts->cycles += inside == &counts->write;
-            inside = NULL;
-        } else if (!inside && (regs.rip == shared->read || regs.rip == shared->write)) {
-            inside = regs.rip == shared->read ? &counts->read : &counts->write;
-            stack = regs.rsp;
-        }
-        if (inside)
-            ++*inside;
-    }
-    return 0;
-}
-
-static int attach(const pid_t thread)
-{
-    int status;
-    if (ptrace(PTRACE_SEIZE, thread, NULL, NULL) != 0 || ptrace(PTRACE_INTERRUPT, thread, NULL, NULL) != 0)
-        return -1;
-    return waitpid(thread, &status, __WALL) == thread ? 0 : -1;
-}
-
 static int measure_instructions(const int cycles, char **const argv, const int count)
 {
-    struct counts counts = {0};
+    struct step_counts counts = {0};
     const pid_t child = fork();
     if (child == 0) {
         wanted_cycles = 0;
@@ -393,7 +345,8 @@ static int measure_instructions(const int cycles, char **const argv, const int c
     }
     while (shared->cycle < WARM_UP && waitpid(child, NULL, WNOHANG) == 0)
         usleep(1000);
-    const int failed = attach(shared->thread) != 0 || step_cycles(shared->thread, cycles, &counts) != 0;
+    const bool failed =
+        steps_stop(shared->thread) != 0 || steps_count(shared->thread, shared->code, cycles, &counts) != 0;
     if (failed)
         perror("bench_cycle: single-stepping");
     kill(child, SIGKILL);
@@ -401,8 +354,7 @@ static int measure_instructions(const int cycles, char **const argv, const int c
         fprintf(stderr, "bench_cycle: %u packet errors, so this is no measurement\n", shared->errors);
     if (failed || shared->errors > 0)
         return 1;
-    printf("read_instructions=%lld\nwrite_instructions=%lld\ncycle_instructions=%lld\n", counts.read / cycles,
-           counts.write / cycles, (counts.read + counts.write) / cycles);
+    steps_print(&counts);
     return 0;
 }
 
