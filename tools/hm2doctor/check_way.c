@@ -6,7 +6,8 @@
 
 #include "doctor.h"
 
-#define LOOPBACK_NET 127u
+#define LOOPBACK_NET  127u
+#define QUIET_PACKETS 20 /* a second: what computers say of themselves, to a line on which nobody answers */
 
 /* A line of /proc/net/route; addresses and mask are in network order, printed as a number of this machine. */
 struct route {
@@ -111,6 +112,26 @@ static void check_sharing(struct patient *const p)
         }
     }
     find(p->findings, "sharing", GRADE_OK, "%s leads to nothing else by default", p->interface);
+}
+
+static void check_traffic(struct patient *const p)
+{
+    char text[STATE_TEXT_BYTES];
+    long long packets;
+    if (!state_text(p->state, text, sizeof text, "doctor/traffic/%s", p->interface) ||
+        !text_named_number(text, "packets", &packets)) {
+        find(p->findings, "traffic", GRADE_UNKNOWN, "whether other packets pass %s is not known", p->interface);
+        return;
+    }
+    if (packets <= QUIET_PACKETS) {
+        find(p->findings, "traffic", GRADE_OK, "%s is quiet: %lld packets in a second", p->interface, packets);
+        return;
+    }
+    remedy(find(p->findings, "traffic", GRADE_ADVICE,
+                "%lld packets pass %s in a second while nothing is asked here; each of the longest holds a reply up by "
+                "123 us at 100 Mbit/s",
+                packets, p->interface),
+           false, "tcpdump -n -c 20 -i %s (stop the program that sends them; is one using the card?)", p->interface);
 }
 
 static void check_neighbour(struct patient *const p)
@@ -258,6 +279,7 @@ void check_way(struct patient *const p)
         check_route(p);
     if (p->interface[0] && strcmp(p->interface, "lo") != 0) {
         check_sharing(p);
+        check_traffic(p);
         check_neighbour(p);
         check_conflict(p);
         check_reverse_path(p);

@@ -11,6 +11,7 @@
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/resource.h>
@@ -122,6 +123,55 @@ static bool ask_firewall(const char *const unused, struct answer *const answer)
     return command_run("PATH=$PATH:/usr/sbin nft list ruleset", answer->text, answer->cap) == 0;
 }
 
+/* ---- traffic -------------------------------------------------------------------------------------------------------
+ */
+
+#define LISTEN_S 1
+
+enum { COLUMN_RECEIVED = 1, COLUMN_SENT = 9 }; /* of /proc/net/dev, behind the name */
+
+static unsigned long long column(const char *text, const unsigned number)
+{
+    unsigned long long value = 0;
+    for (unsigned i = 0; i <= number; i++) {
+        char *end;
+        value = strtoull(text, &end, 10);
+        text = end;
+    }
+    return value;
+}
+
+/* Packets received and sent so far. */
+static bool count_packets(const char *const interface, unsigned long long *const packets)
+{
+    char line[256];
+    const size_t len = strlen(interface);
+    bool found = false;
+    FILE *const file = fopen("/proc/net/dev", "r");
+    while (file && !found && fgets(line, sizeof line, file)) {
+        const char *const name = line + strspn(line, " ");
+        found = strncmp(name, interface, len) == 0 && name[len] == ':';
+        if (found)
+            *packets = column(name + len + 1, COLUMN_RECEIVED) + column(name + len + 1, COLUMN_SENT);
+    }
+    if (file)
+        fclose(file);
+    return found;
+}
+
+/* While nothing is sent from here. */
+static bool ask_traffic(const char *const interface, struct answer *const answer)
+{
+    unsigned long long before, after;
+    if (!count_packets(interface, &before))
+        return false;
+    (void)sleep(LISTEN_S);
+    if (!count_packets(interface, &after) || after < before)
+        return false;
+    say(answer, "packets %llu\n", (after - before) / LISTEN_S);
+    return true;
+}
+
 /* ---- ARP -----------------------------------------------------------------------------------------------------------
  */
 
@@ -189,7 +239,11 @@ bool live_ask(const char *const question, char *const text, const size_t cap)
     static const struct {
         const char *name;
         bool (*ask)(const char *rest, struct answer *answer);
-    } questions[] = {{"ethtool/", ask_ethtool}, {"limits", ask_limits}, {"firewall", ask_firewall}, {"arp/", ask_arp}};
+    } questions[] = {{"ethtool/", ask_ethtool},
+                     {"limits", ask_limits},
+                     {"firewall", ask_firewall},
+                     {"traffic/", ask_traffic},
+                     {"arp/", ask_arp}};
     struct answer answer = {.text = text, .cap = cap};
     for (size_t i = 0; i < sizeof questions / sizeof questions[0]; i++) {
         const size_t len = strlen(questions[i].name);
