@@ -133,7 +133,7 @@ static double loop_khz(const struct hm2_module *const module, const struct hm2_c
     return from_period;
 }
 
-/* False for a NaN: what cannot be used is kept as NaN, and so reported again and again. */
+/* False for a NaN: what cannot be used is kept as NaN, and so reported in every cycle. */
 static bool same(const double a, const double b)
 {
     return a == b;
@@ -218,14 +218,16 @@ void hm2_dpll_align(struct hm2_module *const module)
         hold_at_zero(module->context);
 }
 
-/* Of the timers, one is looked at in each cycle. */
 static bool is_unchanged(const struct dpll *const ctx, const struct hm2_cycle *const cycle)
 {
-    const struct timer *const timer = &ctx->timer[cycle->writes % TIMERS];
     const uint32_t words = (*ctx->plimit ^ ctx->for_plimit) | (*ctx->time_const ^ ctx->for_time_const) |
                            (*ctx->dds_size ^ ctx->for_dds_size);
-    return words == 0 && cycle->period_ns == ctx->for_period_ns && same(*ctx->base_freq_khz, ctx->for_khz) &&
-           same(*timer->offset_us, timer->for_us);
+    if (words != 0 || cycle->period_ns != ctx->for_period_ns || !same(*ctx->base_freq_khz, ctx->for_khz))
+        return false;
+    for (const struct timer *timer = ctx->timer; timer < ctx->timer + TIMERS; timer++)
+        if (!same(*timer->offset_us, timer->for_us))
+            return false;
+    return true;
 }
 
 static void pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)

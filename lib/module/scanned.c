@@ -31,7 +31,6 @@ struct instance {
     uint32_t for_rate, for_fast, for_slow; /* parameters that the control word was computed from */
     uint32_t present;                      /* inputs that exist as pins */
     unsigned end;                          /* behind the highest of them, in whole groups of HM2_GATHER */
-    unsigned next;                         /* inputs whose choice of a filter is looked at next */
     uint32_t shown, shown_raw, counts;     /* levels as the pins have them, and counters as they were read last */
     struct hm2_level filtered[MAX_INPUTS], raw[MAX_INPUTS];
     struct hm2_bit_in slow[MAX_INPUTS]; /* of inputs that do not exist: a constant 0 */
@@ -303,21 +302,13 @@ HM2_RARE static void pack_parameters(const struct hm2_module *const module, cons
     }
 }
 
-/* Filters act in milliseconds, so that a choice may take some cycles: one group of inputs is looked at in each. */
-static void select_filters(struct instance *const instance, struct hm2_window *const selected, const unsigned unit)
-{
-    const unsigned first = instance->next, behind = first + HM2_GATHER;
-    const uint32_t group = ((1u << HM2_GATHER) - 1u) << first;
-    const uint32_t slow = hm2_gather(instance->slow + first, HM2_GATHER) << first;
-    hm2_window_set(selected, unit, (hm2_window_get(selected, unit) & ~group) | slow);
-    instance->next = behind < instance->end ? behind : 0;
-}
-
 void hm2_scanned_pack(struct hm2_module *const module, const struct hm2_cycle *const cycle)
 {
     struct scanned *const ctx = module->context;
-    for (unsigned unit = 0; unit < module->instances; unit++)
-        select_filters(&ctx->instance[unit], &ctx->filter_select, unit);
+    for (unsigned unit = 0; unit < module->instances; unit++) {
+        const struct instance *const instance = &ctx->instance[unit];
+        hm2_window_set(&ctx->filter_select, unit, hm2_gather(instance->slow, instance->end));
+    }
     if (ctx->turn == HM2_FIRST_TURN || cycle->writes == 0)
         pack_parameters(module, cycle->writes == 0);
 }
