@@ -301,7 +301,7 @@ check-unit: $(UNIT_BIN) all
 check-system: all $(SYSTEM_BIN)
 	@scripts/run-tests $(BUILDDIR) system $(SYSTEM_BIN)
 
-bench: all $(BENCH_BIN) ## compare with the peers, as ratios, in one run
+bench: all $(BENCH_BIN) $(BUILDDIR)/unit/test_pipeline ## compare with the peers, as ratios, in one run
 	@tests/bench/run $(BUILDDIR)
 	@tests/bench/modules $(BUILDDIR)
 	@tests/bench/flash $(BUILDDIR)
