@@ -199,10 +199,15 @@ static void take_extra(struct hm2_plan *const plan, const uint8_t extra[const PL
     plan->facts.waited_us = hm2_get_le16(extra + PLAN_EXTRA_WAITED);
 }
 
+static const uint8_t *trailer_of(const struct hm2_plan *const plan, const uint8_t *const reply)
+{
+    return reply + plan->reply_len - PLAN_TRAILER_BYTES;
+}
+
 static void accept(struct hm2_plan *const plan)
 {
     memcpy(plan->reply, plan->landing, plan->reply_len);
-    const uint8_t *const trailer = plan->reply + plan->reply_len - PLAN_TRAILER_BYTES;
+    const uint8_t *const trailer = trailer_of(plan, plan->reply);
     const uint32_t write_shown = hm2_get_le32(trailer + PLAN_TRAILER_WRITE);
     plan->outstanding = false;
     plan->facts.write_confirmed =
@@ -211,11 +216,6 @@ static void accept(struct hm2_plan *const plan)
     if (!is_empty(&plan->in_state[PLAN_FLYING]) || hm2_delta32(plan->section_write_seq, write_shown) > 0)
         settle_sections(plan, write_shown);
     settle_session(plan, hm2_get_le32(trailer + PLAN_TRAILER_SESSION));
-}
-
-static const uint8_t *trailer_of(const struct hm2_plan *const plan, const uint8_t *const reply)
-{
-    return reply + plan->reply_len - PLAN_TRAILER_BYTES;
 }
 
 /* By how many packets the card had received more when it made this reply than when it made the last fresh one: two that
@@ -246,7 +246,7 @@ enum hm2_reply hm2_plan_judge(struct hm2_plan *const plan, const size_t len)
     uint8_t extra[PLAN_EXTRA_BYTES];
     if ((plan->pipelines ? plan_unfold_turn(plan, len, &is_turn, extra) : len) != plan->reply_len)
         return HM2_REPLY_MALFORMED;
-    const uint8_t *const trailer = plan->landing + plan->reply_len - PLAN_TRAILER_BYTES;
+    const uint8_t *const trailer = trailer_of(plan, plan->landing);
     const uint64_t age = requests_since(plan, hm2_get_le32(trailer + PLAN_TRAILER_REQUEST));
     if (age >= plan->requests)
         return HM2_REPLY_MALFORMED;
