@@ -331,20 +331,28 @@ static int count_misses(const int cycles, char **const argv, const int count)
     return 0;
 }
 
-/* ---- instructions ------------------------------------------------------------------------------------------------ */
-
-static int measure_instructions(const int cycles, char **const argv, const int count)
+/* A process in which the driver has warmed up and runs on. */
+static pid_t run_apart(const char *const name, const char *const text, const char *const folder, char **const arguments,
+                       const int count)
 {
-    struct step_counts counts = {0};
     const pid_t child = fork();
     if (child == 0) {
         wanted_cycles = 0;
-        start_driver(argv[0], argv[1], argv[3], argv + 4, count - 4);
+        start_driver(name, text, folder, arguments, count);
         for (;;)
             pause();
     }
     while (shared->cycle < WARM_UP && waitpid(child, NULL, WNOHANG) == 0)
         usleep(1000);
+    return child;
+}
+
+/* ---- instructions ------------------------------------------------------------------------------------------------ */
+
+static int measure_instructions(const int cycles, char **const argv, const int count)
+{
+    struct step_counts counts = {0};
+    const pid_t child = run_apart(argv[0], argv[1], argv[3], argv + 4, count - 4);
     const bool failed =
         steps_stop(shared->thread) != 0 || steps_count(shared->thread, shared->code, cycles, &counts) != 0;
     if (failed)
@@ -424,13 +432,6 @@ static int measure_exchanges(const struct sockaddr_in *const peer, const struct 
     return 0;
 }
 
-/* Packets without contents, or with those of a driver. */
-static int echo(char **const argv, const struct packet *const request, const struct packet *const write)
-{
-    const struct sockaddr_in peer = address_of(argv[0], argv[1]);
-    return measure_exchanges(&peer, request, strtoul(argv[3], NULL, 10), write, (int)strtol(argv[5], NULL, 10));
-}
-
 /* ---- what a driver sends ----------------------------------------------------------------------------------------- */
 
 static int open_tap(const char *const interface)
@@ -468,15 +469,7 @@ static void capture(const int tap, struct packet *const wanted)
 static void capture_cycle(const char *const interface, struct packet *const request, struct packet *const write,
                           char **const argv, const int count)
 {
-    const pid_t child = fork();
-    if (child == 0) {
-        wanted_cycles = 0;
-        start_driver(argv[0], argv[1], argv[2], argv + 3, count - 3);
-        for (;;)
-            pause();
-    }
-    while (shared->cycle < WARM_UP && waitpid(child, NULL, WNOHANG) == 0)
-        usleep(1000);
+    const pid_t child = run_apart(argv[0], argv[1], argv[2], argv + 3, count - 3);
     const int tap = open_tap(interface);
     capture(tap, request);
     capture(tap, write);
@@ -496,13 +489,15 @@ int main(const int argc, char **const argv)
         return count_misses((int)strtol(argv[4], NULL, 10), argv + 2, argc - 2);
     if (argc >= 6 && strcmp(argv[1], "count") == 0)
         return measure_instructions((int)strtol(argv[4], NULL, 10), argv + 2, argc - 2);
-    if (argc >= 8 && (strcmp(argv[1], "echo") == 0 || strcmp(argv[1], "same") == 0)) {
+    const bool same = argc >= 12 && strcmp(argv[1], "same") == 0;
+    if (same || (argc == 8 && strcmp(argv[1], "echo") == 0)) {
+        const struct sockaddr_in peer = address_of(argv[2], argv[3]);
         struct packet request = {.len = strtoul(argv[4], NULL, 10)}, write = {.len = strtoul(argv[6], NULL, 10)};
         if (request.len > sizeof request.bytes || write.len > sizeof write.bytes)
             return 2;
-        if (strcmp(argv[1], "same") == 0 && argc >= 12)
+        if (same)
             capture_cycle(argv[8], &request, &write, argv + 9, argc - 9);
-        return echo(argv + 2, &request, &write);
+        return measure_exchanges(&peer, &request, strtoul(argv[5], NULL, 10), &write, (int)strtol(argv[7], NULL, 10));
     }
     if (argc == 6 && strcmp(argv[1], "serve") == 0)
         return serve(argv + 2);

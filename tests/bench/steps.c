@@ -23,8 +23,8 @@ int steps_stop(const pid_t thread)
 
 /* ---- breakpoint -------------------------------------------------------------------------------------------------- */
 
-/* The last of them, or -1. */
-static pid_t stop_all(const pid_t process)
+/* The last one for which that returned 0, or -1. */
+static pid_t for_each_thread(const pid_t process, int (*const act)(pid_t thread))
 {
     char path[64];
     pid_t last = -1;
@@ -32,7 +32,7 @@ static pid_t stop_all(const pid_t process)
     DIR *const folder = opendir(path);
     for (const struct dirent *entry; folder && (entry = readdir(folder));) {
         const pid_t thread = (pid_t)strtol(entry->d_name, NULL, 10);
-        if (thread > 0 && steps_stop(thread) == 0)
+        if (thread > 0 && act(thread) == 0)
             last = thread;
     }
     if (folder)
@@ -40,18 +40,9 @@ static pid_t stop_all(const pid_t process)
     return last;
 }
 
-static void go_on_all(const pid_t process)
+static int go_on(const pid_t thread)
 {
-    char path[64];
-    (void)snprintf(path, sizeof path, "/proc/%d/task", (int)process);
-    DIR *const folder = opendir(path);
-    for (const struct dirent *entry; folder && (entry = readdir(folder));) {
-        const pid_t thread = (pid_t)strtol(entry->d_name, NULL, 10);
-        if (thread > 0)
-            (void)ptrace(PTRACE_CONT, thread, NULL, NULL);
-    }
-    if (folder)
-        (void)closedir(folder);
+    return (int)ptrace(PTRACE_CONT, thread, NULL, NULL);
 }
 
 static bool stands_behind(const pid_t thread, const uintptr_t code)
@@ -81,14 +72,14 @@ static pid_t wait_for_it(const uintptr_t code)
 pid_t steps_find(const pid_t process, const uintptr_t code)
 {
     struct user_regs_struct regs;
-    const pid_t any = stop_all(process);
+    const pid_t any = for_each_thread(process, steps_stop);
     if (any < 0)
         return -1;
     void *const at = (void *)code; // NOLINT(performance-no-int-to-ptr): an address in another process
     const unsigned long before = (unsigned long)ptrace(PTRACE_PEEKTEXT, any, at, NULL);
     if (ptrace(PTRACE_POKETEXT, any, at, (before & ~0xFFul) | BREAKPOINT) != 0)
         return -1;
-    go_on_all(process);
+    (void)for_each_thread(process, go_on);
     const pid_t thread = wait_for_it(code);
     if (thread < 0 || ptrace(PTRACE_POKETEXT, thread, at, before) != 0 ||
         ptrace(PTRACE_GETREGS, thread, NULL, &regs) != 0)

@@ -330,6 +330,24 @@ static void without_margin_plain_cycles_go_on_where_turns_have_ended(void **stat
     no_failures(f);
 }
 
+static struct servo_rig *anew(void **const state)
+{
+    assert_int_equal(servo_tear_down(state), 0);
+    assert_int_equal(set_up(state), 0);
+    return *state;
+}
+
+/* A cycle whose datagram to the card, or from it, is lost; and so are those after it until something else is said. */
+static void lose_one(struct numbers *const n, const bool reply)
+{
+    const struct sim_faults loss = {.seed = 1, .loss = 1.0};
+    if (reply)
+        servo_spoil_next_reply(n->rig, &loss);
+    else
+        servo_faults(n->rig, &loss);
+    go_on(n);
+}
+
 static const struct sim_faults all_late = {.seed = 1, .delay_min_ns = 300000, .delay_max_ns = 300000};
 
 static void delay_all(struct servo_rig *const f)
@@ -354,19 +372,12 @@ static void where_turns_end_losses_cost_no_more_than_elsewhere(void **state)
     const unsigned last = cycles_to_the_last_turn(&n);
     assert_in_range(last, 20, 50);
     for (unsigned i = 0; i < 8; i++) {
-        assert_int_equal(servo_tear_down(state), 0);
-        assert_int_equal(set_up(state), 0);
-        struct servo_rig *const f = *state;
+        struct servo_rig *const f = anew(state);
         n = running(f);
         delay_all(f);
         for (unsigned before = 0; before < last - 2u + i / 2u; before++)
             go_on(&n);
-        const struct sim_faults loss = {.seed = 1, .loss = 1.0};
-        if (i % 2 == 0)
-            servo_faults(f, &loss);
-        else
-            servo_spoil_next_reply(f, &loss);
-        go_on(&n);
+        lose_one(&n, i % 2 != 0);
         (void)cycles_to_the_last_turn(&n);
         assert_true(servo_get(f, "pipeline.active") == 0);
         servo_no_faults(f);
@@ -393,18 +404,11 @@ static void where_turns_begin_too(void **state)
 {
     const unsigned first = cycles_to_the_first_turn(*state);
     for (unsigned i = 0; i < 8; i++) {
-        assert_int_equal(servo_tear_down(state), 0);
-        assert_int_equal(set_up(state), 0);
-        struct servo_rig *const f = *state;
+        struct servo_rig *const f = anew(state);
         servo_load(f, PIPELINED);
         servo_cycles(f, first - 2u + i / 2u);
         struct numbers n = numbers_of(f);
-        const struct sim_faults loss = {.seed = 1, .loss = 1.0};
-        if (i % 2 == 0)
-            servo_faults(f, &loss);
-        else
-            servo_spoil_next_reply(f, &loss);
-        go_on(&n);
+        lose_one(&n, i % 2 != 0);
         servo_no_faults(f);
         for (unsigned more = 0; more < 3; more++)
             go_on(&n);

@@ -797,9 +797,7 @@ static const char *const settings_keeps[] = {
 /* ---- the same for the settings of other modules, without those that the first cards have shown; what a draw does not
  * bring comes after the last one */
 
-static const struct setting others_settings[] = {
-    {0, "watchdog.timeout_ns", 100000000},
-};
+#define others_settings settings_settings
 
 static const struct setting drives_impossible_settings[] = {
     {0, "watchdog.timeout_ns", 100000000}, {2500, "xy2mod.00.enable", 1},
@@ -816,9 +814,7 @@ static const struct wave others_waves[] = {
     {"led.CR03", WAVE_SQUARE, 0.5, 0.5, 100, 0, 2560},
 };
 
-static const struct event others_events[] = {
-    {1, 0, PAD, 3, SIM_LOW, 0, 0},
-};
+#define others_events settings_events
 
 #define drives_impossible_waves  others_waves
 #define drives_impossible_events others_events
